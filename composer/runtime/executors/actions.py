@@ -28,10 +28,8 @@ from unique_identifier_msgs.msg import UUID
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors import readiness
-from composer.runtime.executors.exceptions import is_closing
-from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.readiness import Handle, SetCallback, Signal
-from composer.runtime.executors.tasks import Report, TaskRunner, name_of
+from composer.runtime.executors.tasks import TaskRunner
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,59 +138,6 @@ class ActionSource:
             and getattr(self._waitable, _PENDING[kind]).get(item[0]) not in self._waitable._futures
             for kind, item in taken.items()
         )
-
-
-def contain_exceptions(server: ActionServer, report: Report) -> None:
-    """Turn exceptions of the server's callbacks into a response to the client, and a report.
-
-    A goal or cancellation whose callback raises is rejected; a goal whose execution raises is
-    aborted. rclpy would send no response, and contains only ``Exception``.
-    """
-
-    def reject_goal(_: object) -> GoalResponse:
-        return GoalResponse.REJECT
-
-    def reject_cancel(_: object) -> CancelResponse:
-        return CancelResponse.REJECT
-
-    def abort(goal: Any) -> Any:
-        if goal.is_active:
-            goal.abort()
-        return server.action_type.Result()
-
-    def abort_accepted(goal: Any) -> None:
-        goal.execute(abort)  # a goal that was only accepted cannot be aborted directly
-
-    server.register_goal_callback(_contained(server._goal_callback, reject_goal, report))
-    server.register_cancel_callback(_contained(server._cancel_callback, reject_cancel, report))
-    server.register_execute_callback(_contained(server._execute_callback, abort, report))
-    accepted = _contained(server._handle_accepted_callback, abort_accepted, report)
-    server.register_handle_accepted_callback(accepted)
-
-
-def _contained(
-    callback: Callable[[Any], Any], fallback: Callable[[Any], Any], report: Report
-) -> Callable[[Any], Any]:
-    def fail(error: BaseException, argument: Any) -> Any:
-        if not isinstance(error, Cancelled):  # the loop stops: nothing to report
-            report(name_of(callback), error)
-        return fallback(argument)
-
-    def call(argument: Any) -> Any:
-        try:
-            return callback(argument)
-        except BaseException as error:
-            return fail(error, argument)
-
-    async def call_and_await(argument: Any) -> Any:
-        try:
-            return await callback(argument)
-        except BaseException as error:
-            if is_closing(error):
-                raise
-            return fail(error, argument)
-
-    return call_and_await if inspect.iscoroutinefunction(callback) else call
 
 
 async def execute_goal_request(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import inspect
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.client import Client
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
@@ -19,7 +18,7 @@ from rclpy.task import Future as RclpyFuture
 
 from composer.model import ExecutorKind
 from composer.runtime.clock.clock import COMPUTER, Clock
-from composer.runtime.executors.actions import ActionSource, contain_exceptions
+from composer.runtime.executors.actions import ActionSource
 from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.scheduler import Scheduler
@@ -29,8 +28,7 @@ from composer.runtime.executors.sources import (
     ServiceSource,
     SubscriptionSource,
     Taken,
-    is_implicit,
-    source_of,
+    rclpy_callback,
 )
 from composer.runtime.executors.tasks import Report, TaskRunner, name_of
 
@@ -58,29 +56,37 @@ class Loop(Scheduler):
         """
         super().__init__(name, on_exception or exception_log(clock), kind, threads, clock)
         self._group_of: dict[object, SourceGroup] = {}  # by the entity that was added
-        self._nodes: dict[Node, _ImplicitEntities] = {}
+        #: What runs rclpy's own code, to which nodes refer weakly, and their services.
+        self._nodes: dict[Node, tuple[NodeExecutor, SourceGroup]] = {}
         # rcl has one callback per entity, so two threads must not add it to two groups.
         self._changing = threading.RLock()
 
     @property
     def _executor(self) -> NodeExecutor:
-        return NodeExecutor(self, lambda: None)
+        return NodeExecutor(self)
 
     def add_node(self, node: Node) -> None:
-        """Serve the entities that rclpy creates for a node: parameter and logger services.
+        """Serve the services that a node has now, by their own callbacks: those for parameters.
 
-        Everything the node has now is served by its own callbacks. Of what it gets later, only the
-        simulated clock and QoS events are served; other entities must be added.
+        All of them are one group: they are rarely used, and a file descriptor for each would be
+        thousands in a large system. Everything else must be added.
         """
+        services: Iterable[Any] = node.services
+        sources = [
+            ServiceSource(service, rclpy_callback(service, self.run_task)) for service in services
+        ]
         with self._changing:
-            self._nodes[node] = _ImplicitEntities(self, node, self._changing)
+            executor = self._executor
+            self._nodes[node] = executor, self.add_group(*sources)
+            node.executor = executor  # type: ignore[assignment]  # the part that rclpy uses
 
     def remove_node(self, node: Node) -> None:
         """Stop serving the node and all its entities. Call it before the node is destroyed."""
         with self._changing:
-            entities = self._nodes.pop(node, None)
-            if entities is not None:
-                entities.close()
+            _, group = self._nodes.pop(node, (None, None))
+            if group is not None:
+                node.executor = None  # type: ignore[assignment]
+                self.remove_group(group)
             for entity in _entities_of(node):
                 self.remove(entity)
 
@@ -103,11 +109,7 @@ class Loop(Scheduler):
         self._serve(client, ClientSource(client, self._executor))
 
     def add_action_server(self, server: ActionServer) -> None:
-        """Handle the server's goal, cancel and result requests.
-
-        If one of its callbacks raises, the goal is rejected or aborted, the cancellation rejected.
-        """
-        contain_exceptions(server, self.report)
+        """Handle the server's goal, cancel and result requests. Its callbacks must not raise."""
         self._serve(server, ActionSource(server, self._executor, self))
 
     def add_action_client(self, client: ActionClient) -> None:
@@ -129,76 +131,10 @@ class Loop(Scheduler):
             if group is not None:
                 self.remove_group(group)
 
-    def implicit_source(self, entity: object) -> EntitySource | None:
-        """Return the source of an entity that rclpy created, or None if it needs none."""
-        return source_of(entity, self._executor, self.run_task)
-
     def _serve(self, entity: object, source: EntitySource) -> None:
         with self._changing:
             self.remove(entity)
-            for entities in self._nodes.values():
-                entities.discard(entity)
             self._group_of[entity] = self.add_group(source)
-
-
-class _ImplicitEntities:
-    """The entities of a node that were not added explicitly, served as one group.
-
-    All are rarely used. A file descriptor for each would be thousands in a large system.
-    """
-
-    def __init__(self, loop: Loop, node: Any, changing: threading.RLock) -> None:
-        self._loop = loop
-        self._node = node
-        self._changing = changing
-        self._group = loop.add_group()
-        self._sources: dict[object, EntitySource] = {}
-        self._update_pending = False
-        self._closed = False
-        self._executor = NodeExecutor(loop, self._update_soon)  # the node refers to it weakly
-        node.executor = self._executor
-        for entity in _entities_of(node):
-            self._add(entity)
-
-    def discard(self, entity: object) -> None:
-        """Stop serving an entity: it was destroyed, or added explicitly."""
-        source = self._sources.pop(entity, None)
-        if source is not None:
-            self._group.discard(source)
-
-    def close(self) -> None:
-        """Stop serving the node."""
-        self._closed = True
-        self._node.executor = None
-        self._sources.clear()
-        self._loop.remove_group(self._group)
-
-    def _update_soon(self) -> None:
-        if not self._update_pending:
-            self._update_pending = True
-            self._loop.call_soon(self._update)
-
-    def _update(self) -> None:
-        """Follow the entities that were created or destroyed meanwhile."""
-        with self._changing:
-            self._update_pending = False
-            if self._closed:
-                return
-            present = _entities_of(self._node)
-            for destroyed in self._sources.keys() - set(present):
-                self.discard(destroyed)
-            for entity in filter(is_implicit, present):
-                self._add(entity)
-
-    def _add(self, entity: object) -> None:
-        source = None if entity in self._sources else self._loop.implicit_source(entity)
-        if source is None:
-            return
-        try:
-            self._group.add(source)
-        except InvalidHandle:
-            return  # destroyed meanwhile
-        self._sources[entity] = source
 
 
 def _entities_of(node: Any) -> list[object]:
@@ -208,13 +144,11 @@ def _entities_of(node: Any) -> list[object]:
 class NodeExecutor:
     """``node.executor``: the part of ``rclpy.executors.Executor`` that rclpy's own code uses.
 
-    An ActionServer runs goals by ``create_task``, rclpy's futures their done callbacks. A node
-    calls ``wake`` when one of its entities was created or destroyed.
+    An ActionServer runs goals by ``create_task``, rclpy's futures their done callbacks.
     """
 
-    def __init__(self, loop: TaskRunner, on_wake: Callable[[], None]) -> None:
+    def __init__(self, loop: TaskRunner) -> None:
         self._loop = loop
-        self._on_wake = on_wake
 
     def create_task(self, callback: Callable[..., Any], *args: Any, **kwargs: Any) -> RclpyFuture:
         """Call ``callback``, plain or ``async def``, on the loop; return the future of its result.
@@ -237,8 +171,7 @@ class NodeExecutor:
         return outcome
 
     def wake(self) -> None:
-        """Check the node's entities soon."""
-        self._on_wake()
+        """Do nothing: entities are added and removed by methods of the loop."""
 
     def add_node(self, node: object) -> None:
         """Do nothing: nodes are added by ``Loop.add_node``."""

@@ -1,4 +1,4 @@
-"""The sources of subscriptions, services, clients and QoS events.
+"""The sources of subscriptions, services and clients.
 
 Together with ``actions`` and ``readiness``, everything that uses rclpy's internals.
 """
@@ -7,17 +7,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Coroutine
-from functools import partial, wraps
+from functools import partial
 from typing import Any, Protocol
 
-from rclpy.client import Client
-from rclpy.event_handler import EventHandler
-from rclpy.service import Service
 from rclpy.subscription import Subscription
-from rclpy.time_source import TimeSource
 
 from composer.runtime.executors import readiness
-from composer.runtime.executors.readiness import EntitySource, Signal
+from composer.runtime.executors.readiness import Signal
 from composer.runtime.executors.tasks import name_of
 
 RunTask = Callable[[Coroutine[Any, Any, Any]], object]
@@ -199,79 +195,3 @@ def complete_request(client: Any, executor: object, number: int, response: Any) 
         return
     future._set_executor(executor)  # the loop reports exceptions of done callbacks
     future.set_result(response)
-
-
-class EventSource:
-    """Calls the callback of a QoS event of a publisher or a subscription."""
-
-    may_skip = False
-
-    def __init__(self, handler: Any) -> None:
-        self._handler = handler
-        self._handle = handler._EventHandler__event
-        self._seen: tuple[object, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """The kind of event and the callback."""
-        return f"event {self._handler.event_type.name} ({name_of(self._handler.callback)})"
-
-    def attach(self, signal: Signal) -> None:
-        """Signal the event."""
-        signal.attach(self._handle, readiness.EVENT)
-
-    def detach(self, signal: Signal) -> None:
-        """Stop that."""
-        signal.detach(self._handle)
-
-    def take(self) -> Any:
-        """Return the status if it has changed: rcl always returns one.
-
-        Its ``..._change`` fields are not enough: attaching resets them to zero.
-        """
-        status = self._handle.take_event()
-        fields = [name for name in dir(status) if name.endswith(("_count", "_count_change"))]
-        counts = tuple(getattr(status, name) for name in fields)
-        happened = any(counts) and counts != self._seen
-        self._seen = tuple(
-            0 if name.endswith("_change") else count
-            for name, count in zip(fields, counts, strict=True)
-        )
-        return status if happened else None
-
-    def call(self, taken: Any) -> None:
-        """Call back with the status."""
-        self._handler.callback(taken)
-
-
-def source_of(entity: object, executor: object, run_task: RunTask) -> EntitySource | None:
-    """Return the source that serves an entity by the callback it was created with.
-
-    None for timers, guard conditions and actions, which are not served this way.
-    """
-    match entity:
-        case Subscription():
-            return SubscriptionSource(entity, _with_message_only(entity.callback))
-        case Service():
-            return ServiceSource(entity, rclpy_callback(entity, run_task))
-        case Client():
-            return ClientSource(entity, executor)
-        case EventHandler():
-            return EventSource(entity)
-    return None
-
-
-def _with_message_only(callback: Callable[[Any], object]) -> Callable[[Taken], object]:
-    @wraps(callback)  # for its name
-    def call(taken: Taken) -> object:
-        return callback(taken[0])
-
-    return call
-
-
-def is_implicit(entity: object) -> bool:
-    """Return whether rclpy adds such entities to a running node: QoS events and the clock."""
-    callback = getattr(entity, "callback", None)
-    return isinstance(entity, EventHandler) or isinstance(
-        getattr(callback, "__self__", None), TimeSource
-    )

@@ -5,7 +5,7 @@ Everything here depends on rclpy's internals (rclpy 7.1, ROS 2 Jazzy).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache, partialmethod
 from typing import Any
 
@@ -366,28 +366,6 @@ def adopted(target: Any) -> type[AdoptedNode]:
             f"the class cannot be derived from: {error}; run it as an 'executable'"
         ) from error
     return made  # type: ignore[no-any-return]
-
-
-@cache
-def shared_class(base: Any) -> Any:
-    """Return the class of a ROS node that shows rclpy's executors the entities of its instance.
-
-    Timers are not among them: the composer calls them.
-    """
-
-    def shared(name: str) -> property:
-        own: Any = getattr(Node, name)
-
-        def both(self: Any) -> Iterator[Any]:
-            yield from own.fget(self)
-            instance = vars(self).get("_composer_instance")
-            if instance is not None and instance.node is not None:
-                yield from own.fget(instance.node)
-
-        return property(both)
-
-    names = ("publishers", "subscriptions", "clients", "services", "waitables")
-    return type(base.__name__, (base,), {name: shared(name) for name in names})
 
 
 def is_managed(target: type[Node]) -> bool:

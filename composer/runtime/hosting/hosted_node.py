@@ -24,7 +24,7 @@ from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
-from composer.runtime.hosting.adopted_node import adopted, is_managed, shared_class
+from composer.runtime.hosting.adopted_node import adopted, is_managed
 from composer.runtime.hosting.declared_ports import (
     DeclaredPorts,
     HostingError,
@@ -103,9 +103,7 @@ class HostedNode(LocalNode):
     # --- transitions
 
     def _make_ros_node(self) -> RosNode:
-        node = make_ros_node(self.model, remapping_arguments(self.model))
-        node.__class__ = shared_class(cast("Any", type(node)))
-        return node
+        return make_ros_node(self.model, remapping_arguments(self.model))
 
     def _make_strand(self) -> Strand:
         return ExclusiveStrand(self.loop)  # a callback may wait while the loop goes on
@@ -119,7 +117,6 @@ class HostedNode(LocalNode):
         self._keep_changed_parameters()
         instance = self._new_instance()
         self._instance, self._entities = instance, instance.entities
-        vars(self._ros)["_composer_instance"] = instance
         await self._in_thread(instance, partial(self._construct, instance), "constructor")
 
     async def _call_user(self, transition: str) -> None:
@@ -177,7 +174,6 @@ class HostedNode(LocalNode):
         self._entities = PortSet()
         if instance is None:
             return
-        vars(self._ros)["_composer_instance"] = None
         instance.ended.set()  # threads that spin the node return
         for executor in instance.executors:
             executor.shutdown(0.0)

@@ -20,8 +20,6 @@ from composer.runtime.executors.tasks import sleep
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.loops import KINDS, Bench, bench, peer, wait_for_line
 
-ERRORS = [ValueError, SystemExit, KeyboardInterrupt]
-
 
 @pytest.fixture(params=KINDS)
 def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
@@ -122,79 +120,6 @@ def test_an_early_response_waits_until_its_request_is_registered(
         on.loop.remove(client)
         client.destroy()
     assert on.reports == []
-
-
-@pytest.mark.parametrize("error", ERRORS)
-@pytest.mark.parametrize("kind", ["plain", "async"])
-def test_a_goal_whose_execution_raises_is_aborted(
-    on: Bench, error: type[BaseException], kind: str
-) -> None:
-    def fall_over(goal: Any) -> None:
-        raise error
-
-    async def fall_over_later(goal: Any) -> None:
-        await sleep(on.loop, 0.01)
-        raise error
-
-    execute = fall_over if kind == "plain" else fall_over_later
-    with serving(on, execute_callback=execute):
-        client = own_client(on)
-        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
-        assert handle.accepted
-        assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_ABORTED
-        on.loop.remove(client)
-        client.destroy()
-    assert on.errors() == [error]
-
-
-@pytest.mark.parametrize("error", ERRORS)
-def test_a_goal_whose_acceptance_raises_is_rejected(on: Bench, error: type[BaseException]) -> None:
-    def fall_over(goal: Any) -> GoalResponse:
-        raise error
-
-    with serving(on, goal_callback=fall_over):
-        client = own_client(on)
-        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
-        assert not handle.accepted
-        on.loop.remove(client)
-        client.destroy()
-    assert on.errors() == [error]
-
-
-def test_a_goal_whose_accepted_callback_raises_is_aborted(on: Bench) -> None:
-    def fall_over(goal: Any) -> None:
-        raise ValueError("broken")
-
-    with serving(on, handle_accepted_callback=fall_over):
-        client = own_client(on)
-        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
-        assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_ABORTED
-        on.loop.remove(client)
-        client.destroy()
-    assert on.errors() == [ValueError]
-
-
-def test_a_cancellation_whose_callback_raises_is_rejected(on: Bench) -> None:
-    refused: list[bool] = []
-
-    def fall_over(goal: Any) -> CancelResponse:
-        raise ValueError("broken")
-
-    async def execute(goal: Any) -> Navigate.Result:
-        while not refused:
-            await sleep(on.loop, 0.01)
-        goal.succeed()
-        return Navigate.Result()
-
-    with serving(on, cancel_callback=fall_over, execute_callback=execute):
-        client = own_client(on)
-        handle = wait_for(client.send_goal_async(Navigate.Goal(max_velocity=1.0)))
-        assert wait_for(handle.cancel_goal_async()).goals_canceling == []
-        refused.append(True)
-        assert wait_for(handle.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
-        on.loop.remove(client)
-        client.destroy()
-    assert on.errors() == [ValueError]
 
 
 def answers(asking: Any) -> bool:
