@@ -13,12 +13,12 @@ from collections.abc import Callable
 from typing import Any
 from uuid import uuid4
 
-from rclpy.client import Client
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from composer.runtime.executors.futures import wrap_future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
+from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.protocol.codec import ProtocolError, decode, encode
 from composer.runtime.protocol.requests import INSTANCE_PREFIX, IS_ACTIVE, Instance
 from composer.runtime.ros_graph.changes import PolledGraphChanges
@@ -81,7 +81,7 @@ class OtherInstances:
         self._name = node.resolve_service_name(f"~/{INSTANCE_PREFIX}{uuid4().hex}")
         self._known_name = node.resolve_service_name(f"~/{IS_ACTIVE}")
         self._prefix = node.resolve_service_name(f"~/{INSTANCE_PREFIX}")
-        self._calls: dict[str, _Call] = {}
+        self._asked: set[str] = set()  # the services that are being called
         self._changes = changes
         self._checked_change = -1
         self._has_others = False
@@ -96,7 +96,6 @@ class OtherInstances:
 
     def check(self) -> None:
         """Look for other instances, and ask those that are not known."""
-        self._end_calls()
         change = self._changes.number()
         if change != self._checked_change:
             self._checked_change = change
@@ -110,9 +109,10 @@ class OtherInstances:
             if name.startswith(self._prefix) and name != self._name
         }
         self._reported &= found
-        for name in sorted(found - self._reported - self._calls.keys()):
-            if len(self._calls) < _MAX_CALLS:
-                self._calls[name] = _Call(self._node, self._loop, name, self._on_response)
+        for name in sorted(found - self._reported - self._asked):
+            if len(self._asked) < _MAX_CALLS:
+                self._asked.add(name)
+                self._loop.run_task(self._ask(name))
 
     def _add_service(self) -> None:
         service = self._node.create_service(Trigger, self._name, unused_callback)
@@ -130,11 +130,22 @@ class OtherInstances:
     def _is_starting(self) -> bool:
         return self._own().uptime_s < START_S
 
-    def _end_calls(self) -> None:
-        for name, call in tuple(self._calls.items()):
-            if call.is_done:
-                call.close()
-                del self._calls[name]
+    async def _ask(self, service: str) -> None:
+        client = self._node.create_client(Trigger, service)
+        self._loop.add_client(client)
+        end_s = self._loop.clock.monotonic() + _RESPONSE_WITHIN_S
+        try:
+            while not client.service_is_ready() and self._loop.clock.monotonic() < end_s:
+                await sleep(self._loop, _CHECK_PERIOD_S)
+            called = wrap_future(client.call_async(Trigger.Request()))
+            left_s = end_s - self._loop.clock.monotonic()
+            self._on_response(service, await within(self._loop, called, left_s))
+        except TimeoutError:
+            pass  # it is asked again at the next check
+        finally:
+            self._asked.discard(service)
+            self._loop.remove(client)
+            self._node.destroy_client(client)
 
     def _on_response(self, service: str, response: Any) -> None:
         other = parse_instance(response.message)
@@ -146,47 +157,3 @@ class OtherInstances:
         elif other.uptime_s > START_S:  # otherwise it is about to find out
             self._reported.add(service)
             self._on_permanent(other)
-
-
-class _Call:
-    """One call of the service of another instance."""
-
-    def __init__(
-        self,
-        node: Node,
-        loop: Loop,
-        name: str,
-        on_response: Callable[[str, Any], None],
-    ) -> None:
-        self._node = node
-        self._loop = loop
-        self._name = name
-        self._on_response = on_response
-        self._end_s = self._loop.clock.monotonic() + _RESPONSE_WITHIN_S
-        self._client: Client = node.create_client(Trigger, name)
-        self._future: Any = None
-        loop.add_client(self._client)
-        self._send()
-
-    @property
-    def is_done(self) -> bool:
-        """Whether the response has arrived or is overdue."""
-        has_response = self._future is not None and self._future.done()
-        return has_response or self._loop.clock.monotonic() > self._end_s
-
-    def close(self) -> None:
-        """Destroy the client."""
-        self._loop.remove(self._client)
-        self._node.destroy_client(self._client)
-
-    def _send(self) -> None:
-        if self.is_done:
-            return
-        if not self._client.service_is_ready():
-            self._loop.call_later(_CHECK_PERIOD_S, self._send)
-            return
-        self._future = self._client.call_async(Trigger.Request())
-        self._future.add_done_callback(self._receive)
-
-    def _receive(self, future: Any) -> None:
-        self._on_response(self._name, future.result())
