@@ -39,11 +39,8 @@ class OverlappingLoop(Protocol):
 class Strand(Protocol):
     """Runs the callbacks of one node, which must not raise."""
 
-    def post(self, call: Callable[[], object], is_due: Callable[[], bool] | None = None) -> None:
-        """Run ``call`` now, or after the calls that were posted before it.
-
-        A call that waits may be dropped if ``is_due()`` returns false: it has nothing to do.
-        """
+    def post(self, call: Callable[[], object]) -> None:
+        """Run ``call`` now, or after the calls that were posted before it."""
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return a coroutine that runs each step of ``coroutine`` on the strand."""
@@ -52,7 +49,7 @@ class Strand(Protocol):
 class InlineStrand:
     """The strand of a node whose loop calls one callback at a time."""
 
-    def post(self, call: Callable[[], object], _is_due: object = None) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now."""
         call()
 
@@ -67,7 +64,7 @@ class ReentrantStrand(InlineStrand):
     def __init__(self, loop: OverlappingLoop) -> None:
         self._loop = loop
 
-    def post(self, call: Callable[[], object], _is_due: object = None) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now."""
         self._loop.overlap()
         call()
@@ -84,7 +81,7 @@ class SerialStrand:
         # A waiting coroutine is a future: setting its result hands the strand over.
         self._queue: deque[Callable[[], object] | Future[None]] = deque()
 
-    def post(self, call: Callable[[], object], _is_due: object = None) -> None:
+    def post(self, call: Callable[[], object]) -> None:
         """Run ``call`` now, or after the calls that were posted before it."""
         with self._lock:
             if self._is_held:

@@ -30,9 +30,13 @@ from composer.runtime.callbacks.log import Log
 from composer.runtime.executors.futures import Awaited, Future, done_event
 from composer.runtime.executors.strand import ExclusiveStrand, ReentrantStrand, Strand
 from composer.runtime.executors.tasks import name_of
-from composer.runtime.hosting.callback_groups import OwnGroup
 from composer.runtime.hosting.declared_ports import DeclaredPorts
-from composer.runtime.hosting.user_code import UserCode, current_code
+from composer.runtime.hosting.user_code import (
+    PermittedFunction,
+    UserCode,
+    UserFunction,
+    current_code,
+)
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.ports import PortSet, RunningPort
 
@@ -157,8 +161,7 @@ class Instance(UserCode):
         self.lasting_services: list[Service] = []
         #: The thread of the constructor or of the current handler of a transition.
         self.transition_thread: threading.Thread | None = None
-        self._contexts: dict[object, NodeContext] = {}
-        self._own_groups: dict[CallbackGroup, OwnGroup] = {}
+        self._contexts: dict[CallbackGroup, NodeContext] = {}
         #: The names of the timers that exist now: counters are kept by name.
         self.timer_names: set[str] = set()
 
@@ -169,29 +172,30 @@ class Instance(UserCode):
 
     def context_of(self, port: Port, entity: Any) -> NodeContext:
         """Return the context of the port of an entity of rclpy."""
-        context = self.context_for(getattr(entity, "callback_group", None), entity)
+        context = self.context_for(getattr(entity, "callback_group", None))
         return replace(context, gate=self._always_on_context.gate) if port.always_on else context
 
-    def context_for(self, group: CallbackGroup | None, entity: Any) -> NodeContext:
-        """Return the context of an entity in a callback group, which decides what runs with it."""
+    def context_for(self, group: CallbackGroup | None) -> NodeContext:
+        """Return the context of the entities in a callback group, which decides what overlaps.
+
+        A group that the class has defined is asked for each callback, see :meth:`function`.
+        """
         if group is None or group is self.node.default_callback_group:
             return self.context
-        # A group that the class has defined decides for each entity.
-        key = group if type(group) in _GROUPS else (group, entity)
-        if key not in self._contexts:
-            strand = self._strand(group, entity)
-            self._contexts[key] = replace(self.context, strand=strand, group=group)
-        return self._contexts[key]
+        if group not in self._contexts:
+            is_exclusive = type(group) is MutuallyExclusiveCallbackGroup
+            strand: Strand = (ExclusiveStrand if is_exclusive else ReentrantStrand)(
+                self.context.loop
+            )
+            self._contexts[group] = replace(self.context, strand=strand, group=group)
+        return self._contexts[group]
 
-    def _strand(self, group: CallbackGroup, entity: Any) -> Strand:
-        if type(group) is ReentrantCallbackGroup:
-            return ReentrantStrand(self.context.loop)
-        if type(group) is MutuallyExclusiveCallbackGroup:
-            return ExclusiveStrand(self.context.loop)
-        if group not in self._own_groups:
-            self._own_groups[group] = OwnGroup(self, group)
-        entity.callback_group = ReentrantCallbackGroup()  # rclpy's executors would ask as well
-        return self._own_groups[group].strand(entity)
+    def function(self, callback: Any, entity: Any, context: NodeContext) -> UserFunction:
+        """Return a callback of an entity, as its callback group permits it."""
+        group = context.group
+        if type(group) in _GROUPS:
+            return UserFunction(self, callback)
+        return PermittedFunction(self, callback, context, group, entity)
 
     def timer_name(self, callback: object) -> str:
         """Return a name for a timer that has no other one: that of its callback."""

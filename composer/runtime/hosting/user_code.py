@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import inspect
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from types import FrameType
 from typing import Any, cast
+
+from rclpy.callback_groups import CallbackGroup
 
 from composer.behavior import CallCancelled
 from composer.runtime.callbacks.context import NodeContext
@@ -141,6 +143,50 @@ class UserFunction:
     def is_one(self, code: UserCode, function: UserFunction | None) -> bool:
         """Return whether this is ``function``; without it, any one of ``code``."""
         return self.code is code and function in (None, self)
+
+
+#: How often a group that has refused a callback is asked again. rclpy asks at each wake-up.
+_ASK_AGAIN_S = 0.01
+#: Another thread must not begin a callback between the two questions about one.
+_ASKING = threading.Lock()
+
+
+class PermittedFunction(UserFunction):
+    """A callback of an entity in a group of the class's own type, which decides when it runs.
+
+    The group is asked before each call, as by rclpy's executors, and learns of its end. Callbacks
+    of one entity run one at a time, because each is a coroutine.
+    """
+
+    def __init__(
+        self, code: UserCode, function: Any, context: NodeContext, group: CallbackGroup, entity: Any
+    ) -> None:
+        super().__init__(code, function)
+        self.is_async = True
+        self._gate = context.gate
+        self._entity = entity
+        self._can_execute = UserFunction(code, group.can_execute)
+        self._begin = UserFunction(code, group.beginning_execution)
+        self._end = UserFunction(code, group.ending_execution)
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """Return a coroutine that calls the function. It raises what the function raises."""
+        return self._call_permitted(arguments, options)
+
+    async def _call_permitted(self, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
+        while not self._is_permitted():
+            await sleep(self._context.loop, _ASK_AGAIN_S)
+            if not self._gate.incoming:
+                raise CallCancelled(self._gate.refusal)
+        try:
+            result = super().__call__(*arguments, **options)
+            return await result if isinstance(result, Awaitable) else result
+        finally:
+            self._end(self._entity)
+
+    def _is_permitted(self) -> bool:
+        with _ASKING:
+            return bool(self._can_execute(self._entity) and self._begin(self._entity))
 
 
 def call_in_group(context: NodeContext, function: Callable[..., Any], *arguments: Any) -> None:

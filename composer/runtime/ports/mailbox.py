@@ -123,8 +123,8 @@ class Mailbox(Callback):
         self._is_awaiting = False
         # A loop of one thread runs one callback at a time in any case.
         self._is_inline = self._overlaps or isinstance(context.strand, InlineStrand)
-        self._turn = self._on_strand(self._take_turn, self._is_due)
-        self._extra_turn = self._on_strand(self._take_extra_turn, self._is_extra_due)
+        self._turn = self._on_strand(self._take_turn)
+        self._extra_turn = self._on_strand(self._take_extra_turn)
         self._prefetched = self._objects_to_prefetch()
 
     def put(self, message: Any) -> None:
@@ -190,19 +190,8 @@ class Mailbox(Callback):
         own = (self._messages, self._turn, self._gate, self._handle, self._batch)
         return (*own, first, second, third, fourth)
 
-    def _on_strand(
-        self, turn: Callable[[], object], is_due: Callable[[], bool]
-    ) -> Callable[[], object]:
-        return turn if self._is_inline else partial(self._context.strand.post, turn, is_due)
-
-    def _is_due(self) -> bool:
-        return bool(self._messages) and not self._is_awaiting
-
-    def _is_extra_due(self) -> bool:
-        is_due = self._is_due()
-        if not is_due:
-            self._may_schedule_extra.append(True)  # the turn would have begun with it
-        return is_due
+    def _on_strand(self, turn: Callable[[], object]) -> Callable[[], object]:
+        return turn if self._is_inline else partial(self._context.strand.post, turn)
 
     def _take_turn(self) -> None:
         if self._is_awaiting:

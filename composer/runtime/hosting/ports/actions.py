@@ -36,15 +36,15 @@ class HostedActionServer(RunningPort):
         self._server = server
         self.port = instance.ports.port(PortKind.ACTION_SERVER, full_name, server.action_type)
         self.name = self.port.name.value
-        self._context = instance.context_for(server.callback_group, server)
+        self._context = instance.context_for(server.callback_group)
         self._statistics = instance.context.statistics.callback(self.port.kind.value, self.name)
         loop, router = instance.context.loop, instance.context.router
         self._local = LocalActionServer(self.port, server, loop.run_task)
-        goal = UserFunction(instance, server._goal_callback)
+        goal = instance.function(server._goal_callback, server, self._context)
         server.register_goal_callback(self._in_group(goal, self._accepts))
-        cancel = UserFunction(instance, server._cancel_callback)
+        cancel = instance.function(server._cancel_callback, server, self._context)
         server.register_cancel_callback(self._in_group(cancel, _returns(CancelResponse.REJECT)))
-        accepted = UserFunction(instance, server._handle_accepted_callback)
+        accepted = instance.function(server._handle_accepted_callback, server, self._context)
         server.register_handle_accepted_callback(self._in_group(accepted, self._abort_accepted))
         # As in rclpy, the execution of a goal belongs to no callback group.
         self._execution = UserFunction(instance, server._execute_callback)
@@ -182,7 +182,7 @@ class HostedActionClient(RunningPort):
         self._instance = instance
         self._client = client
         self.port = instance.ports.port(PortKind.ACTION_CLIENT, full_name, client._action_type)
-        self._context = instance.context_for(self._client.callback_group, client)
+        self._context = instance.context_for(self._client.callback_group)
         loop, router = instance.context.loop, instance.context.router
         self._send = self._client.send_goal_async
         self._client.send_goal_async = self._send_goal
@@ -212,7 +212,7 @@ class HostedActionClient(RunningPort):
         if not context.gate.waiting:
             return hosted_future(self._instance, CallCancelled(context.gate.refusal))
         if feedback_callback is not None:
-            function = UserFunction(self._instance, feedback_callback)
+            function = self._instance.function(feedback_callback, self._client, self._context)
             feedback_callback = partial(call_in_group, self._context, function)
         return self._send(goal, feedback_callback, **options)
 

@@ -36,8 +36,8 @@ class HostedService(ServicePort):
         self._instance = instance
         self.port = port
         self._given: Any = service
-        callback = UserFunction(instance, service.callback)
         context = instance.context_of(port, self._given)
+        callback = instance.function(service.callback, service, context)
         if is_reentrant(context):
             port = replace(port, reentrant=True)
         super().__init__(context, port, None, callback)

@@ -17,7 +17,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.instance import Instance, is_reentrant
-from composer.runtime.hosting.user_code import UserFunction, call_in_group
+from composer.runtime.hosting.user_code import call_in_group
 from composer.runtime.ports.timer import TimerPort
 
 _NANOSECONDS = 1e9
@@ -80,8 +80,8 @@ class HostedTimerPort(TimerPort):
         is_canceled = Timer.is_canceled(timer)  # created without autostart
         timer.__class__ = HostedTimer
         timer._port, timer._is_canceled = self, is_canceled
-        context = instance.context_for(timer.callback_group, timer)
-        self._function = UserFunction(instance, self._call_back)
+        context = instance.context_for(timer.callback_group)
+        self._function = instance.function(self._call_back, timer, context)
         super().__init__(context, self._model(context), None, self._function)
         if timer.callback is not None:
             self._name = self._function.__name__ = name_of(timer.callback).rpartition(".")[2]
@@ -185,6 +185,6 @@ class HostedGuardCondition(GuardCondition):
     def trigger(self) -> None:
         """Call the callback soon, if the node is active then."""
         if self.callback is not None:
-            context = self._instance.context_for(self.callback_group, self)
-            function = UserFunction(self._instance, self.callback)
+            context = self._instance.context_for(self.callback_group)
+            function = self._instance.function(self.callback, self, context)
             context.loop.call_soon(partial(call_in_group, context, function))

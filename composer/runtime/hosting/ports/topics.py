@@ -21,7 +21,6 @@ from composer.runtime.executors.sources import Taken
 from composer.runtime.hosting.declared_ports import OF_EVERY_NODE
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.ports.qos_events import HostedQosEvents, PendingQosEvents
-from composer.runtime.hosting.user_code import UserFunction
 from composer.runtime.intra_process.publisher import copy_of
 from composer.runtime.ports.mailbox import Mailbox
 from composer.runtime.ports.qos_events import QosEvents
@@ -42,12 +41,13 @@ class HostedPublisher(PublisherPort):
         self._instance = instance
         self.port = port
         self._given = publisher
+        context = instance.context_of(port, publisher)
         self._callbacks = {
-            kind: UserFunction(instance, callback)
+            kind: instance.function(callback, publisher, context)
             for kind, callback in events.callbacks(PortKind.PUBLISHER).items()
         }
         self._held: deque[Any] = deque(maxlen=port.qos.profile.queue_depth)
-        super().__init__(instance.context_of(port, publisher), port)
+        super().__init__(context, port)
         # An attribute of the object hides the method of the class at no cost per call.
         publisher.publish = self._publish_function()  # type: ignore[method-assign, assignment]
 
@@ -109,16 +109,16 @@ class HostedSubscription(SubscriptionPort):
         self._instance = instance
         self.port = port
         self._given = subscription
+        context = instance.context_of(port, subscription)
         self._callbacks = {
-            kind: UserFunction(instance, callback)
+            kind: instance.function(callback, subscription, context)
             for kind, callback in events.callbacks(PortKind.SUBSCRIPTION).items()
         }
         # rclpy's type hints make this a method: it is the callback that the class has given.
         callback: Any = subscription.callback
         self._with_info = subscription._callback_type is Subscription.CallbackType.WithMessageInfo
-        function = UserFunction(instance, callback)
+        function = instance.function(callback, subscription, context)
         handler = (lambda pair: function(*pair)) if self._with_info else function
-        context = instance.context_of(port, subscription)
         if is_reentrant(context):
             port = replace(port, reentrant=True)
         super().__init__(context, port, None, handler)
