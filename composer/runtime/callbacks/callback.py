@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from weakref import ref
 
 from composer.base.source import Located
-from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.repeat_limit import RepeatLimit
@@ -25,7 +24,6 @@ from composer.runtime.metrics.statistics import BATCH_SIZE, CallbackStatistics
 
 if TYPE_CHECKING:
     from composer.runtime.callbacks.context import NodeContext
-    from composer.runtime.callbacks.log import Log
     from composer.runtime.callbacks.mutation_check import MutationCheck
 
 T = TypeVar("T")
@@ -35,30 +33,6 @@ HOT_HZ = 1000.0
 _HOT_WEIGHT = 16
 #: Minimum time between two warnings about the same callback.
 WARNING_PERIOD_S = 5.0
-
-
-class CallbackBudget:
-    """Counts the calls of one callback that exceed its ``budget_ms``, and warns about them."""
-
-    def __init__(
-        self, log: Log, clock: Clock, callback: CallbackStatistics, budget_s: float
-    ) -> None:
-        self._log = log
-        self._callback = callback
-        self._budget_s = budget_s
-        self._repeats = RepeatLimit(clock, WARNING_PERIOD_S)
-
-    def on_overrun(self, duration_s: float) -> None:
-        """Count a call that took too long, and warn unless there was a warning just before."""
-        callback = self._callback
-        callback.overruns += 1
-        if self._repeats.admit(str(callback)) is None:
-            return
-        self._log.warn(
-            f"{callback} took {duration_s * 1e3:.1f} ms, over its budget of "
-            f"{self._budget_s * 1e3:g} ms ({callback.overruns} times so far, at most "
-            f"{callback.times.longest_s * 1e3:.1f} ms)"
-        )
 
 
 class CallbackTimer:
@@ -72,10 +46,11 @@ class CallbackTimer:
         "__weakref__",
         "_adapted_s",
         "_batch",
-        "_budget",
         "_budget_s",
+        "_log",
         "_monotonic",
         "_mutations",
+        "_repeats",
         "_skip",
         "_statistics",
         "_times",
@@ -94,8 +69,11 @@ class CallbackTimer:
         statistics.timer = ref(self)
         self._mutations = context.mutations
         self.last_s = 0.0
-        self._budget_s = inf if budget_ms is None else budget_ms.value / 1e3
-        self._budget = CallbackBudget(context.log, context.loop.clock, statistics, self._budget_s)
+        self._log = context.log
+        self._budget_s, self._repeats = inf, None
+        if budget_ms is not None:
+            self._budget_s = budget_ms.value / 1e3
+            self._repeats = RepeatLimit(context.loop.clock, WARNING_PERIOD_S)
         self._times = statistics.times
         self._batch = statistics.times.batch
         self._adapted_s = 0.0
@@ -125,7 +103,7 @@ class CallbackTimer:
             self._adapt(began_s)
         self.to_skip = self._skip
         if duration_s > self._budget_s:
-            self._budget.on_overrun(duration_s)
+            self._on_overrun(duration_s)
         return None
 
     def wrap(self, work: Work[T]) -> Work[T]:
@@ -153,7 +131,19 @@ class CallbackTimer:
         finally:
             self._times.add(stopwatch.total_s)
             if stopwatch.total_s > self._budget_s:
-                self._budget.on_overrun(stopwatch.total_s)
+                self._on_overrun(stopwatch.total_s)
+
+    def _on_overrun(self, duration_s: float) -> None:
+        """Count a call that exceeds the budget, and warn unless there was a warning just before."""
+        callback = self._statistics
+        callback.overruns += 1
+        if self._repeats is None or self._repeats.admit(str(callback)) is None:
+            return
+        self._log.warn(
+            f"{callback} took {duration_s * 1e3:.1f} ms, over its budget of "
+            f"{self._budget_s * 1e3:g} ms ({callback.overruns} times so far, at most "
+            f"{callback.times.longest_s * 1e3:.1f} ms)"
+        )
 
     def _adapt(self, now_s: float) -> None:
         """Flush the batch, and choose how many calls are timed by how frequent they are."""

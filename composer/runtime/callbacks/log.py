@@ -23,7 +23,6 @@ from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.stacks import is_internal
-from composer.runtime.executors.tasks import Cancellable, SupportsCallLater
 from composer.runtime.host_options import Recorder
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
@@ -37,8 +36,6 @@ _is_enabled = rclpy_implementation.rclpy_logging_logger_is_enabled_for
 _DESTROYED = (InvalidHandle, rclpy_implementation.RCLError)
 #: Minimum time between two log lines about errors of the same callback.
 _ERROR_PERIOD_S = 1.0
-#: Minimum time between two warnings about the same event.
-WARNING_PERIOD_S = 10.0
 
 #: Called with (level, name of the logger, message).
 Write: TypeAlias = Callable[[LogLevel, str, str], None]
@@ -219,36 +216,3 @@ class ErrorLog:
         text = details() if admission.is_first else line()
         self._log.error(f"{callback}: {text}{admission.suffix}")
         self._report(callback, text.partition("\n")[0])
-
-
-class RepeatedWarning:
-    """Warns of one kind of event at once, and of its repetitions in summary."""
-
-    def __init__(self, log: Log, clock: SupportsCallLater, text: Callable[[], str]) -> None:
-        """``text()`` returns the warning when it is logged."""
-        self._log = log
-        self._clock = clock
-        self._text = text
-        self._unreported = 0
-        self._timer: Cancellable | None = None
-
-    def on_events(self, number: int) -> None:
-        """Warn of ``number`` events, or count them if there was a warning just before."""
-        self._unreported += number
-        if self._timer is not None:
-            return
-        self._unreported -= 1
-        self._log.warn(self._text())
-        self._timer = self._clock.call_later(WARNING_PERIOD_S, self._summarize)
-
-    def close(self) -> None:
-        """Log nothing more."""
-        if self._timer is not None:
-            self._timer.cancel()
-
-    def _summarize(self) -> None:
-        self._timer = None
-        if self._unreported:
-            times, self._unreported = self._unreported, 0
-            self._log.warn(f"{self._text()} ({times} times more within {WARNING_PERIOD_S:g} s)")
-            self._timer = self._clock.call_later(WARNING_PERIOD_S, self._summarize)

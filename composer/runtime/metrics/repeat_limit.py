@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock.clock import Clock
@@ -41,8 +42,17 @@ class RepeatLimit:
         self._lock = threading.RLock()
         self._subjects: dict[str, _Subject] = {}
 
-    def admit(self, subject: str) -> Admission | None:
-        """Return whether a line about ``subject`` may be logged now; None if not."""
+    def warn(self, warn: Callable[[str], None], subject: str, text: str, number: int = 1) -> None:
+        """Call ``warn`` with a line about ``subject`` if it may be logged now."""
+        admission = self.admit(subject, number)
+        if admission is not None:
+            warn(f"{text}{admission.suffix}")
+
+    def admit(self, subject: str, number: int = 1) -> Admission | None:
+        """Return whether a line about ``subject`` may be logged now; None if not.
+
+        It is about ``number`` events, and names one of them.
+        """
         now_s = self._clock.monotonic()
         with self._lock:
             known = self._subjects.get(subject)
@@ -50,9 +60,9 @@ class RepeatLimit:
                 subject = self._make_room(subject, now_s)
                 known = self._subjects.get(subject)
             if known is not None and now_s < known.admitted_s + self._period_s:
-                known.omitted += 1
+                known.omitted += number
                 return None
-            self._subjects[subject] = _Subject(now_s)
+            self._subjects[subject] = _Subject(now_s, number - 1)
             return Admission(known is None, 0 if known is None else known.omitted)
 
     def _make_room(self, subject: str, now_s: float) -> str:

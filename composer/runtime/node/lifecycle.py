@@ -303,9 +303,7 @@ class Lifecycle:
 
     def _warn(self, subject: str, text: str) -> None:
         """Log a warning, at most once a second: another node may repeat its request."""
-        admission = self._repeats.admit(subject)
-        if admission is not None:
-            self._log.warn(f"{text}{admission.suffix}")
+        self._repeats.warn(self._log.warn, subject, text)
 
     # --- the services
 

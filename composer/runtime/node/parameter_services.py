@@ -112,9 +112,7 @@ class ParameterServices:
 
     def _refuse(self, service: str, reason: str, response: Any) -> None:
         """Log the refusal, and add it to the response if its type has a reason."""
-        admission = self._repeats.admit(service)
-        if admission is not None:
-            self._warn(f"refused a request of '{service}': {reason}{admission.suffix}")
+        self._repeats.warn(self._warn, service, f"refused a request of '{service}': {reason}")
         if isinstance(response, SetParameters.Response):
             response.results = [_refusal(reason)]
         elif isinstance(response, SetParametersAtomically.Response):
@@ -236,10 +234,11 @@ class LoggerServices:
 
     def _add(self, node: Node, kind: Any, name: str, answer: Callable[[Any, Any], None]) -> None:
         def respond(request: Any, response: Any) -> Any:
-            if not isinstance(request, TooLarge):
+            if isinstance(request, TooLarge):
+                text = f"refused a request of '{name}': {request.reason}"
+                self._repeats.warn(self._warn, name, text)
+            else:
                 answer(request, response)
-            elif (admission := self._repeats.admit(name)) is not None:
-                self._warn(f"refused a request of '{name}': {request.reason}{admission.suffix}")
             return response
 
         node.create_service(limited(kind), f"~/{name}", respond)

@@ -223,9 +223,8 @@ class SimTimeSource:
         try:
             now = Time.from_msg(message.clock)
         except (ValueError, OverflowError) as error:
-            admission = self._repeats.admit(CLOCK_TOPIC)
-            if admission is not None:
-                self._warn(f"ignored a time of {CLOCK_TOPIC}: {error}{admission.suffix}")
+            text = f"ignored a time of {CLOCK_TOPIC}: {error}"
+            self._repeats.warn(self._warn, CLOCK_TOPIC, text)
             return
         with self._changing:
             self._now = now

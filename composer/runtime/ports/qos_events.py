@@ -24,7 +24,6 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.model.qos import Liveliness, incompatibilities
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.log import RepeatedWarning
 from composer.runtime.intra_process.publisher import Target
 from composer.runtime.intra_process.time_limits import (
     Leases,
@@ -33,11 +32,14 @@ from composer.runtime.intra_process.time_limits import (
     Overdue,
     Receiver,
 )
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.ros_graph.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
 _CHECKS = 20
 _MAX_REPORTED = 100  # other nodes can be started without end
+#: Minimum time between two warnings about the same event.
+WARNING_PERIOD_S = 10.0
 
 
 class IncompatibleQos:
@@ -154,7 +156,7 @@ class QosEvents:
         self._context = context
         self._port = port
         self._incompatible = IncompatibleQos(context, port)
-        self._warnings: dict[str, RepeatedWarning] = {}
+        self._repeats = RepeatLimit(context.loop.clock, WARNING_PERIOD_S)
         self._stop_watching: list[Callable[[], None]] = []
         self._active_since_s = inf  # by the loop's clock
         self._is_virtual = context.loop.clock.is_virtual
@@ -218,8 +220,6 @@ class QosEvents:
         self._incompatible.close()
         while self._stop_watching:  # each holds a file descriptor
             self._stop_watching.pop()()
-        for warning in self._warnings.values():
-            warning.close()
 
     def _publisher_events(self) -> Iterator[EventKind]:
         profile = self._port.qos.profile
@@ -273,7 +273,7 @@ class QosEvents:
 
         def on_events(number: int) -> None:
             began_s = self._context.loop.clock.monotonic() - event.period_s
-            context.loop.call_soon(partial(self._on_events, event.name, number, began_s))
+            context.loop.call_soon(partial(self._on_events, event, number, began_s))
 
         count = event.count
         if count is None:
@@ -283,32 +283,26 @@ class QosEvents:
                 endpoint, event.kind, lambda status: on_events(count(status))
             )
         self._stop_watching.append(stop)
-        self._warn_of(event)
-
-    def _warn_of(self, event: EventKind) -> None:
-        """Prepare the warning of an event."""
-        name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
-        self._warnings[event.name] = RepeatedWarning(
-            self._context.log,
-            self._context.loop,
-            lambda: f"{name}: {event.text}{self._publishers()}",
-        )
 
     def _on_overdue(self, event: EventKind) -> OnOverdue:
         """Return what is called when the period of an event has passed, in virtual time."""
-        self._warn_of(event)
 
         def on_overdue(since_s: float) -> None:
             now_s = self._context.loop.clock.monotonic()
-            self._on_events(event.name, 1, since_s if event.period_s else now_s)
+            self._on_events(event, 1, since_s if event.period_s else now_s)
 
         return on_overdue
 
-    def _on_events(self, event: str, number: int, began_s: float) -> None:
+    def _on_events(self, event: EventKind, number: int, began_s: float) -> None:
         is_active = self._context.gate.incoming and began_s >= self._active_since_s
-        if number > 0 and is_active:
-            self._context.statistics.qos_events[event] += number
-            self._warnings[event].on_events(number)
+        if number <= 0 or not is_active:
+            return
+        self._context.statistics.qos_events[event.name] += number
+        admission = self._repeats.admit(event.name, number)
+        if admission is not None:
+            name = f"{self._port.kind} '{self._port.name}' on {self._port.full_name}"
+            text = f"{name}: {event.text}{self._publishers()}{admission.suffix}"
+            self._context.log.warn(text)
 
     def _publishers(self) -> str:
         """Return the names of a subscription's publishers, to append to a sentence."""

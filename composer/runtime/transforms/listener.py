@@ -101,9 +101,7 @@ class TransformListener:
 
     def ignore(self, what: str, problem: str) -> None:
         """Log that a transform is ignored, from time to time."""
-        admission = self._repeats.admit(what)
-        if admission is not None:
-            self._warn(f"ignored the transform {what}: {problem}{admission.suffix}")
+        self._repeats.warn(self._warn, what, f"ignored the transform {what}: {problem}")
 
     def _follow_clock(self) -> None:
         if any(self._users.values()):
