@@ -7,7 +7,6 @@ that returns None leaves the node in a transition state forever.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
@@ -37,7 +36,7 @@ from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.tasks import within
 from composer.runtime.intra_process.taps import transition_tap
 from composer.runtime.metrics.repeat_limit import RepeatLimit
-from composer.runtime.node.managed_node import TransitionOutcome
+from composer.runtime.node.managed_node import ManagedLifecycle, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
 
 _NAMES = {number: name for name, item in TRANSITIONS.items() for number in item.ids.values()}
@@ -66,7 +65,7 @@ class TransitionTimeout(Exception):
     """An asynchronous handler of a transition did not finish in time."""
 
 
-class Lifecycle:
+class Lifecycle(ManagedLifecycle):
     """The state machine of one node, its services and its ``transition_event`` topic.
 
     It runs one transition at a time. During a transition, ``change_state`` requests fail, while
@@ -77,6 +76,7 @@ class Lifecycle:
         self, context: NodeContext, hooks: Hooks, *, timeout_s: float, services: bool = True
     ) -> None:
         """Join the graph. Without ``services`` there is only the topic ``transition_event``."""
+        super().__init__()
         node = context.node
         loop = context.loop
         self._node = node
@@ -86,8 +86,6 @@ class Lifecycle:
         self._log = context.log
         self._statistics = context.statistics
         self._timeout_s = timeout_s
-        self._lock = threading.Lock()
-        self._current: Future[None] | None = None  # the transition that runs now
         self._last_state = ""
         self._repeats = RepeatLimit(loop.clock)
         self._pending_reply: list[Reply] = []  # of the change_state request for it, if any
@@ -138,27 +136,6 @@ class Lifecycle:
             if transition_id in _NAMES
         }
 
-    async def change(self, transition: str) -> TransitionOutcome:
-        """Run a requested ``transition`` as soon as no other one runs. Raises nothing."""
-        while (current := self._acquire()) is not None:
-            await current
-        return await self._run(transition, requested=True)
-
-    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
-        """Run the ``transition`` of a plan as soon as no other one runs. Raises nothing.
-
-        If ``is_outdated()`` then, do not run it: a requested transition came first.
-        """
-        while (current := self._acquire()) is not None:
-            await current
-        if is_outdated():
-            self._release()
-            reason = "a requested transition came first"
-            return TransitionOutcome(
-                transition, self.state, success=False, reason=reason, requested=False, outdated=True
-            )
-        return await self._run(transition, requested=False)
-
     def fail_request(self) -> None:
         """Answer the pending ``change_state`` request: its transition hangs. Thread-safe."""
         self._answer(success=False)
@@ -170,20 +147,6 @@ class Lifecycle:
             self._node.destroy_service(service)
         self._last_state = self.state
         self._machine.destroy_when_not_in_use()
-
-    def _acquire(self) -> Future[None] | None:
-        """Acquire the state machine, or return the future of the transition that runs."""
-        with self._lock:
-            if self._current is None:
-                self._current = Future()
-                return None
-            return self._current
-
-    def _release(self) -> None:
-        with self._lock:
-            current, self._current = self._current, None
-        if current is not None:
-            current.set_result(None)
 
     async def _run(self, transition: str, *, requested: bool) -> TransitionOutcome:
         """Run a transition; the state machine has been acquired, and is released at the end."""
@@ -198,7 +161,7 @@ class Lifecycle:
             self._log.error(f"'{transition}' was not completed: {internal_report_of(error)}")
             return TransitionOutcome(transition, self.state, success=False, reason=describe(error))
         finally:
-            self._release()
+            self._lock.release()
 
     async def _transition(self, transition: str, *, requested: bool) -> TransitionOutcome:
         start = self.state
@@ -312,7 +275,7 @@ class Lifecycle:
             self._warn("size", f"refused a request of 'change_state': {request.reason}")
             reply(ChangeState.Response(success=False))
             return
-        if self._acquire() is not None:
+        if self._lock.try_acquire() is not None:
             self._refuse(_label(request), f"the node is {self.state}")
             reply(ChangeState.Response(success=False))
             return

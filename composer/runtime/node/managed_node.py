@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
 from composer.plan import FaultKind
+from composer.runtime.executors.futures import Future
 from composer.runtime.metrics.statistics import Statistics
 
 if TYPE_CHECKING:  # tests of the supervision run without ROS
@@ -56,24 +59,80 @@ class NodeListener(Protocol):
         """Receive a line of the log."""
 
 
-class ManagedLifecycle(Protocol):
-    """The transitions of a node. The coroutines run on the node's loop and raise nothing."""
+class TransitionLock:
+    """Lets one transition of a node run at a time. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._changing = threading.Lock()
+        self._current: Future[None] | None = None
 
     @property
+    def is_held(self) -> bool:
+        """Whether a transition runs."""
+        return self._current is not None
+
+    def try_acquire(self) -> Future[None] | None:
+        """Acquire it, or return the future of the transition that runs."""
+        with self._changing:
+            if self._current is None:
+                self._current = Future()
+                return None
+            return self._current
+
+    async def acquire(self) -> None:
+        """Acquire it as soon as no transition runs."""
+        while (current := self.try_acquire()) is not None:
+            await current
+
+    def release(self) -> None:
+        """Let the next transition run."""
+        with self._changing:
+            current, self._current = self._current, None
+        if current is not None:
+            current.set_result(None)
+
+
+class ManagedLifecycle(ABC):
+    """The transitions of a node. The coroutines run on the node's loop and raise nothing."""
+
+    def __init__(self) -> None:
+        self._lock = TransitionLock()
+
+    @property
+    @abstractmethod
+    def state(self) -> str:
+        """The label of the lifecycle state. Thread-safe."""
+
+    @property
+    @abstractmethod
     def available(self) -> Mapping[str, int]:
         """The ids of the transitions that can be requested now, by name. Thread-safe."""
 
     async def change(self, transition: str) -> TransitionOutcome:
         """Run a requested ``transition`` as soon as no other one runs."""
+        await self._lock.acquire()
+        return await self._run(transition, requested=True)
 
     async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
         """Run the ``transition`` of a plan as soon as no other one runs.
 
         If ``is_outdated()`` then, do not run it: a requested transition came first.
         """
+        await self._lock.acquire()
+        if not is_outdated():
+            return await self._run(transition, requested=False)
+        self._lock.release()
+        reason = "a requested transition came first"
+        return TransitionOutcome(
+            transition, self.state, success=False, reason=reason, requested=False, outdated=True
+        )
 
-    def fail_request(self) -> None:
+    def fail_request(self) -> None:  # noqa: B027  nothing to do is the default
         """Answer a pending request of an external node: its transition hangs. Thread-safe."""
+
+    @abstractmethod
+    async def _run(self, transition: str, *, requested: bool) -> TransitionOutcome:
+        """Run a transition; the lock has been acquired, and is to be released at the end."""
 
 
 class ManagedNode(Protocol):

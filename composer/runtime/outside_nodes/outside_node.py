@@ -1,10 +1,8 @@
 """A node outside the process, as the supervision sees it."""
 
-# ruff: noqa: B027  (methods that most or all of these nodes need not implement)
-
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Set
 from typing import Any
 
@@ -23,11 +21,12 @@ from composer.model.lifecycle import (
 from composer.model.names import split_node_name
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.exceptions import describe
-from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import (
+    ManagedLifecycle,
     ManagedNode,
     NodeListener,
     TransitionOutcome,
@@ -67,13 +66,14 @@ class OutsideContext:
     nodes: Mapping[str, ManagedNode]
 
 
-class OutsideNode(ABC):
+class OutsideNode(ManagedLifecycle):
     """A :class:`.ManagedNode` of another process, and its :class:`.ManagedLifecycle`.
 
     A subclass does the work of transitions, on the loop.
     """
 
     def __init__(self, model: Node, context: OutsideContext) -> None:
+        super().__init__()
         self.model = model
         self.loop = context.loop
         self.activations = 0
@@ -83,7 +83,6 @@ class OutsideNode(ABC):
         self._listener = context.listener
         self._logger = model.full_name.strip("/").replace("/", ".")
         self._state = UNCONFIGURED
-        self._lock = _TransitionLock()
         self._end_s: float | None = None
         #: Whether it is not there, and its return will be reported.
         self._is_lost = False
@@ -165,30 +164,6 @@ class OutsideNode(ABC):
     def available(self) -> Mapping[str, int]:
         """The ids of the transitions that can be requested now, by name."""
         return available_transitions(self._state)
-
-    async def change(self, transition: str) -> TransitionOutcome:
-        """Run a requested ``transition`` as soon as no other one runs. Raises nothing."""
-        await self._lock.acquire()
-        return await self._run(transition, requested=True)
-
-    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
-        """Run the ``transition`` of a plan as soon as no other one runs. Raises nothing."""
-        await self._lock.acquire()
-        if is_outdated():
-            self._lock.release()
-            reason = "a requested transition came first"
-            return TransitionOutcome(
-                transition,
-                self._state,
-                success=False,
-                reason=reason,
-                requested=False,
-                outdated=True,
-            )
-        return await self._run(transition, requested=False)
-
-    def fail_request(self) -> None:
-        """Do nothing: requests of external nodes do not pass through this process."""
 
     async def _run(self, transition: str, *, requested: bool) -> TransitionOutcome:
         """Run a transition; the lock has been acquired, and is released at the end."""
@@ -287,25 +262,3 @@ def elsewhere_text(model: Node, names: Set[str]) -> str:
     keys = [f"'name: {name}'"] if name != model.ros_name.value else []
     keys += [f"'namespace: {namespace}'"] if namespace != model.namespace.value else []
     return f"; there is {shown[0]} instead: write {' and '.join(keys)}"
-
-
-class _TransitionLock:
-    """Lets one transition run at a time. For tasks of one loop."""
-
-    def __init__(self) -> None:
-        self._current: Future[None] | None = None
-
-    @property
-    def is_held(self) -> bool:
-        """Whether a transition runs."""
-        return self._current is not None
-
-    async def acquire(self) -> None:
-        while self._current is not None:
-            await self._current
-        self._current = Future()
-
-    def release(self) -> None:
-        current, self._current = self._current, None
-        if current is not None:
-            current.set_result(None)
