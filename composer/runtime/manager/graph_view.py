@@ -33,7 +33,7 @@ from composer.runtime.protocol.requests import (
     StatusQuery,
 )
 from composer.runtime.ros.parameter_values import plain_value
-from composer.runtime.ros_graph.changes import PolledGraphChanges
+from composer.runtime.ros_graph.changes import GraphChanges
 from composer.runtime.ros_graph.graph import SETTLE_S, RosGraph
 from composer.runtime.ros_graph.node_endpoints import details, endpoints, node_names
 
@@ -54,7 +54,7 @@ class GraphObserver:
     and if they have been known for a while or nothing changes anymore.
     """
 
-    def __init__(self, changes: PolledGraphChanges, own_participant: bytes) -> None:
+    def __init__(self, changes: GraphChanges, own_participant: bytes) -> None:
         """``own_participant`` is the prefix of the ids of the endpoints of the node."""
         self._node = node = changes.node
         self._own_host = own_participant[_HOST]

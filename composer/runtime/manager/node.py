@@ -56,7 +56,7 @@ from composer.runtime.ros.manager_interface import (
     answer_message,
     read_request,
 )
-from composer.runtime.ros_graph.changes import PolledGraphChanges
+from composer.runtime.ros_graph.changes import GraphChanges
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 from composer.runtime.transforms.listener import TransformListeners
@@ -150,7 +150,7 @@ class ManagerNode:
             self._add_service(Trigger, command, partial(self._on_command, command))
         self._add_service(Trigger, IS_ACTIVE, self._on_is_active)
         self._add_service(limited(RequestService), REQUEST, self._on_request)
-        changes = PolledGraphChanges(self._node)
+        changes = GraphChanges(self._node)
         self._instances = OtherInstances(
             changes,
             self._loop,

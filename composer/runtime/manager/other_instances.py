@@ -21,7 +21,7 @@ from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.protocol.codec import ProtocolError, decode, encode
 from composer.runtime.protocol.requests import INSTANCE_PREFIX, IS_ACTIVE, Instance
-from composer.runtime.ros_graph.changes import PolledGraphChanges
+from composer.runtime.ros_graph.changes import GraphChanges
 from composer.runtime.ros_graph.graph import participant, servers_of
 
 #: Discovery of another participant takes up to three seconds; later, this system is not refused.
@@ -60,7 +60,7 @@ class OtherInstances:
 
     def __init__(
         self,
-        changes: PolledGraphChanges,
+        changes: GraphChanges,
         loop: Loop,
         own: Callable[[], Instance],
         *,
