@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from composer.client.session import Deadline
 from composer.client.systems.local_queries import local_report
 from composer.client.systems.managers import Systems
-from composer.runtime.process.instance_lock import LocalSystems
+from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import SystemReport
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ class SystemReports:
         self._session = session
         self._on_report = on_report
         self._systems: Systems | None = None
-        self._local = LocalSystems()
         self._discovered: tuple[str, ...] = ()
         self._change = 0
         self._users = 0
@@ -71,7 +70,7 @@ class SystemReports:
         now_s = time.monotonic()
         if now_s >= self._due_s:
             self._due_s = now_s + _SYSTEMS_PERIOD_S
-            local = self._local.current()
+            local = local_systems()
             change = self._session.changes.number()
             if change != self._change:
                 self._change, self._discovered = change, systems.discover()

@@ -37,8 +37,6 @@ _LOOKED_AT_WITHIN_S = 5.0
 #: A process that has just started writes who it is.
 _WRITTEN_WITHIN_S = 0.05
 _POLL_S = 0.005
-#: A change of the folder is only known for certain after this time: its clock advances in steps.
-_CHANGE_IS_CERTAIN_NS = 100_000_000
 _OPEN_LOCK = os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC
 _WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -90,8 +88,6 @@ def hold_instance_lock(
         }
         json.dump(holder, lock)
         lock.flush()
-        with suppress(OSError):  # for LocalSystems: the file may exist since long
-            os.utime(_folder(), follow_symlinks=False)
         yield
 
 
@@ -101,31 +97,6 @@ def local_systems() -> dict[str, str]:
     Unlike discovery, which may take seconds, this is complete at once.
     """
     return {name: str(holder["pid"]) for name, holder in _holders()}
-
-
-class LocalSystems:
-    """The systems of :func:`local_systems`, for a process that asks again and again.
-
-    The lock files of ended systems remain, hundreds in time. All are opened again only if the
-    folder has changed, as it does when a system starts.
-    """
-
-    def __init__(self) -> None:
-        self._known: dict[str, str] = {}
-        self._changed_ns: int | None = None
-
-    def current(self) -> dict[str, str]:
-        """Return the process ids of the systems by their names."""
-        changed_ns = _changed_ns()
-        if changed_ns is None or changed_ns != self._changed_ns:
-            is_certain = changed_ns is not None and (
-                COMPUTER.time_ns() - changed_ns > _CHANGE_IS_CERTAIN_NS
-            )
-            self._changed_ns = changed_ns if is_certain else None
-            self._known = local_systems()
-        else:
-            self._known = {name: pid for name, pid in self._known.items() if is_held(name)}
-        return dict(self._known)
 
 
 def local_discovery() -> dict[str, dict[str, str]]:
@@ -289,14 +260,6 @@ def _unsafe(folder: Path) -> StartRefused:
         f"other users can write to '{folder}', the folder for instance locks",
         "remove it, or set XDG_RUNTIME_DIR to a folder that only you can write to",
     )
-
-
-def _changed_ns() -> int | None:
-    """Return when the folder of the lock files was changed, None if there is none."""
-    try:
-        return _folder().lstat().st_mtime_ns
-    except OSError:
-        return None
 
 
 def _file_name(name: str, suffix: str) -> str:

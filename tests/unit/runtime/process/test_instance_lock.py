@@ -14,7 +14,6 @@ import pytest
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.process import StartRefused, instance_lock
 from composer.runtime.process.instance_lock import (
-    LocalSystems,
     hold_instance_lock,
     is_held,
     local_systems,
@@ -68,23 +67,6 @@ def test_looking_for_a_lock_that_was_never_held_creates_no_file(folder: Path) ->
     assert list(folder.iterdir()) == []
 
 
-def test_an_observer_follows_systems_whose_lock_files_existed_before(folder: Path) -> None:
-    observer = LocalSystems()
-    assert observer.current() == {}
-    with hold_instance_lock(NAME):
-        pass
-    for _ in range(2):
-        _make_older(folder)
-        assert observer.current() == {}  # also from what it remembers
-        with hold_instance_lock(NAME), hold_instance_lock("/lab/robot"):
-            pid = str(os.getpid())
-            assert observer.current() == {NAME: pid, "/lab/robot": pid}
-            _make_older(folder)
-            assert observer.current() == {NAME: pid, "/lab/robot": pid}
-            assert observer.current() == {NAME: pid, "/lab/robot": pid}
-        assert observer.current() == {}
-
-
 @pytest.mark.parametrize("session", ["/run/user/1000", ""])
 def test_a_login_session_and_a_service_share_the_folder(
     session: str, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -111,24 +93,6 @@ def test_old_lock_files_stay_while_a_system_runs(folder: Path, tmp_path: Path) -
         os.utime(path, (0.0, 0.0))
     subprocess.run(clean, check=True, capture_output=True)
     assert not folder.exists()
-
-
-def test_an_observer_opens_no_files_of_ended_systems_again(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with hold_instance_lock(NAME), hold_instance_lock("/lab/robot"):
-        pass
-    _make_older(folder)
-    observer = LocalSystems()
-    assert observer.current() == {}
-    monkeypatch.setattr(os, "listdir", None)
-    assert observer.current() == {}
-
-
-def _make_older(folder: Path) -> None:
-    """Move the last change of the folder into the past, by another time at each call."""
-    changed_ns = folder.stat().st_mtime_ns - 10**9
-    os.utime(folder, ns=(changed_ns, changed_ns))
 
 
 def test_a_symbolic_link_in_place_of_the_folder_is_refused(folder: Path, tmp_path: Path) -> None:
