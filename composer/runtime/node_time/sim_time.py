@@ -13,7 +13,7 @@ import math
 import threading
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
@@ -29,13 +29,6 @@ from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 NANOSECONDS = 1_000_000_000
 _NEVER = math.inf
-
-
-class SupportsCallSoon(Protocol):
-    """The part of a loop that timers need."""
-
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the loop as soon as it is free."""
 
 
 class SimTimer:
@@ -87,7 +80,7 @@ class SimTimers:
     - from zero, which means unknown: all delays start.
     """
 
-    def __init__(self, loop: SupportsCallSoon) -> None:
+    def __init__(self, loop: Loop) -> None:
         """Make the calls on ``loop``."""
         self._loop = loop
         self._changing = threading.Lock()

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
 from math import inf
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from composer.model import Port
 from composer.runtime.callbacks.callback import Callback
@@ -19,28 +19,16 @@ from composer.runtime.metrics.statistics import CallbackStatistics
 _DEEP = 256
 
 
-class MessageQueue(Protocol):
-    """Messages, the oldest first. Every method is atomic."""
-
-    def append(self, message: Any, /) -> None:
-        """Add a message."""
-
-    def pop(self, first: int, /) -> Any:
-        """Remove and return a message; ``first`` must be 0. Raises IndexError if empty."""
-
-    def clear(self) -> None:
-        """Remove all messages."""
-
-    def __len__(self) -> int:
-        """Return the number of messages."""
-
-
 class _DeepQueue(deque[Any]):
     """A deque that pops its first item as a list does."""
 
     def pop(self, _first: int = 0, /) -> Any:
         """Remove and return the oldest message."""
         return self.popleft()
+
+
+#: Messages, the oldest first. Every method is atomic.
+MessageQueue: TypeAlias = "list[Any] | _DeepQueue"
 
 
 def message_queue(depth: float) -> MessageQueue:
