@@ -205,7 +205,7 @@ class ManagerNode:
         if self._query_socket is not None:
             self._query_socket.close(_ENDS_WITHIN_S)
         self._status.on_change(lambda: None)
-        self._loop.call_soon(self._reports.publish_now)
+        self._loop.call_soon(self._reports.publish)
         if linger:
             self._loop.clock.sleep(_RESPONSES_ARRIVE_WITHIN_S)
         self._loop.stop(_ENDS_WITHIN_S)

@@ -14,11 +14,10 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.duration import Duration
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -166,10 +165,6 @@ _LONGEST_PERIOD_S = 1.0
 _BATCH_S = 0.05
 _LONGEST_BATCH_S = 0.5
 _MAX_SHARE = 0.02
-#: A stopped process does not keep others from getting the status.
-_ACKNOWLEDGED_WITHIN_S = 0.2
-_ACKNOWLEDGMENT_PERIOD_S = 0.02
-_AT_ONCE = Duration()
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +193,6 @@ class ReportPublisher:
         self._events = events
         self._sources = sources
         self._started_s = self._clock.monotonic()
-        self._is_waiting = False  # for subscriptions that do not have the last message yet
         self._publish_due = threading.Lock()  # held while a message with changes is due
         self._batch_s = _BATCH_S
         self._changed_s = self._due_s = 0.0  # monotonic: the last change, when it is published
@@ -208,7 +202,8 @@ class ReportPublisher:
         #: Whether reports have timings: the last ones, for the coordinating process.
         self.includes_timings = False
         self._diagnostics = self._publisher(DiagnosticArray, _DIAGNOSTICS, 10, self.publish)
-        self._state = self._publisher(String, f"~/{STATE_TOPIC}", STATE_QOS, self.publish)
+        # Not at once: ``ros2 topic echo`` would report the last one as lost, which it gets first.
+        self._state = self._publisher(String, f"~/{STATE_TOPIC}", STATE_QOS, self.publish_soon)
         self._callbacks = self._publisher(
             String, f"~/{CALLBACKS_TOPIC}", CALLBACKS_QOS, self._publish_callbacks
         )
@@ -246,16 +241,6 @@ class ReportPublisher:
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
 
-    def publish(self) -> None:
-        """Publish the status once all subscriptions have the last one.
-
-        A message that replaces it earlier would be reported as lost by ``ros2 topic echo``.
-        """
-        if self._is_waiting:
-            return
-        self._is_waiting = True
-        self._publish_by(self._clock.monotonic() + _ACKNOWLEDGED_WITHIN_S)
-
     def publish_soon(self) -> None:
         """Publish a change, with others that follow. Thread-safe."""
         self._changed_s = self._clock.monotonic()
@@ -263,8 +248,8 @@ class ReportPublisher:
             self._due_s = self._changed_s + max(self._batch_s, _LONGEST_BATCH_S)
             self._loop.call_later(self._batch_s, self._publish_changes)
 
-    def publish_now(self) -> None:
-        """Publish the status, whether subscriptions have the last one or not."""
+    def publish(self) -> None:
+        """Publish the status."""
         start_s = self._clock.monotonic()
         self.number += 1
         report = self.report()
@@ -309,10 +294,3 @@ class ReportPublisher:
             return
         self._publish_due.release()
         self.publish()
-
-    def _publish_by(self, end_s: float) -> None:
-        if self._clock.monotonic() < end_s and not self._state.wait_for_all_acked(_AT_ONCE):
-            self._loop.call_later(_ACKNOWLEDGMENT_PERIOD_S, partial(self._publish_by, end_s))
-            return
-        self._is_waiting = False
-        self.publish_now()

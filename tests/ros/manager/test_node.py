@@ -262,5 +262,5 @@ def test_no_published_status_is_lost(tmp_path: Path) -> None:
             return int(process.stdout.readline())
 
     with running(ROBOT, tmp_path, planner=PLANNER):
-        # The manager waits 0.2 s for the acknowledgment; a process may not be scheduled for longer.
+        # A process may not be scheduled for longer than the manager waits.
         wait_until(lambda: lost() == 0, "a subscription that loses nothing")
