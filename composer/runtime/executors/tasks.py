@@ -93,8 +93,9 @@ class Task(Generic[T]):
 
     def start(self) -> Future[T]:
         """Schedule the first step; return the future of the result."""
+        future = self.future  # another thread may have dropped it on return
         self._call_soon(self._begin)
-        return self.future
+        return future
 
     def close(self) -> None:
         """Close the coroutine now, on the calling thread: it will never be resumed."""

@@ -195,6 +195,14 @@ class TestTask:
         assert what == "fail"
         assert str(error) == "broken"
 
+    def test_an_exception_before_start_returns_is_not_reported_either(self, loop: Loop) -> None:
+        def call_at_once(callback: Callable[[], object]) -> None:  # as another thread may
+            callback()
+
+        outcome = Task(fail(), call_at_once, loop.report, loop.count_end).start()
+        assert isinstance(outcome.exception(), ValueError)
+        assert loop.reports == []
+
     @pytest.mark.parametrize("error", [SystemExit, KeyboardInterrupt])
     def test_system_exit_ends_the_task_but_not_the_loop(
         self, loop: Loop, error: type[BaseException]
