@@ -353,9 +353,11 @@ def _handler(system: System, action: Action) -> Iterator[Diagnostic]:
     if node is None:
         return
     if node.behavior is None:
-        message = f"node '{action.name}' has no behavior, in which '{action.verb}' could act"
-        yield Diagnostic(SETTING_WITHOUT_EFFECT, message, action.name.span)
-        return
+        if node.hosted_class is None:
+            message = f"node '{action.name}' has no behavior and no class"
+            message = f"{message}, in which '{action.verb}' could act"
+            yield Diagnostic(SETTING_WITHOUT_EFFECT, message, action.name.span)
+        return  # a callback of a class may be any function
     handler = action.options.get("handler")
     names = [item.name for item in handlers(node)]
     if handler is not None and handler.value not in names:

@@ -40,6 +40,9 @@ class Instruments(Protocol):
     def behavior(self, node: Node, behavior: object) -> None:
         """Prepare a new behavior, before its handlers are bound."""
 
+    def callback(self, node: str, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return what a node (its full name) calls in the place of a callback of its class."""
+
     def timer(self, node: str, timer: str, tick: Callable[[], None]) -> Callable[[], None]:
         """Return what a timer of a node (its full name) calls in the place of ``tick``."""
 

@@ -63,6 +63,7 @@ class Faults:
         self._faults: dict[str, list[Fault]] = {}
         self._seen: defaultdict[str, Counter[object]] = defaultdict(Counter)
         self._handlers: defaultdict[str, list[BeforeHandler]] = defaultdict(list)
+        self._handler_names: defaultdict[str, dict[str, None]] = defaultdict(dict)
 
     # --- the seams of the runtime
 
@@ -85,11 +86,15 @@ class Faults:
         if isinstance(behavior, Tester):
             self._on_tester(behavior)
             return
-        before = self._handlers[node.name.value]
         for name in dir(behavior):
             handler = getattr(behavior, name, None) if name.startswith("on_") else None
             if callable(handler):
-                setattr(behavior, name, _with_faults(name, handler, before))
+                setattr(behavior, name, self.callback(node.full_name, name, handler))
+
+    def callback(self, node: str, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function by which faults act before each call of a handler or a callback."""
+        self._handler_names[node][name] = None
+        return _with_faults(name, function, self._handlers[node])
 
     # --- the verbs of a test
 
@@ -106,6 +111,10 @@ class Faults:
     def seen(self) -> Mapping[str, int]:
         """How many messages or calls have come so far, by topic or timer."""
         return {name: max(counts.values(), default=0) for name, counts in self._seen.items()}
+
+    def handlers(self, node: str) -> Collection[str]:
+        """Return the handlers and callbacks that a node (its full name) has had so far."""
+        return self._handler_names[node]
 
     def before_next_handler(self, node: str, handler: str | None, act: Callable[[], None]) -> None:
         """Call ``act()`` once, before the next call of a handler; None for any."""

@@ -14,6 +14,7 @@ a method of this class, nothing in the system runs.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from math import inf
@@ -28,6 +29,7 @@ from composer.bags.reader import open_bag
 from composer.model import ParameterType, PortKind
 from composer.model.names import matches_wildcard
 from composer.runtime.executors.futures import Future
+from composer.runtime.hosting.user_code import current_code
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.managed_node import InProcessNode
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
@@ -233,7 +235,11 @@ class SystemTest(TestedSystem):
         self._faults.end(topic)
 
     def raise_in(self, node: str, handler: str | None = None, error: str = "injected") -> None:
-        """Let the next call of a handler, such as "on_tick", raise RuntimeError; None for any."""
+        """Let the next call of a handler, such as "on_tick", raise RuntimeError; None for any.
+
+        The handlers of a class are its callbacks, by the names of their functions. Raises
+        TestFailure for a node without code in this process, or without such a handler.
+        """
 
         def fail() -> None:
             raise RuntimeError(error)
@@ -241,8 +247,18 @@ class SystemTest(TestedSystem):
         self._before_handler(node, handler, fail, "raise an exception")
 
     def hang(self, node: str, seconds: float, handler: str | None = None) -> None:
-        """Let the next call of a handler block its executor for this time."""
-        self._before_handler(node, handler, partial(self._run.clock.sleep, seconds), "hang")
+        """Let the next call of a handler block for this time, as :meth:`raise_in`.
+
+        A behavior blocks its executor, a class its callback group.
+        """
+        self._before_handler(node, handler, partial(self._block, seconds), "hang")
+
+    def _block(self, seconds: float) -> None:
+        code = current_code()
+        if code is None:
+            self._run.clock.sleep(seconds)
+        else:  # as time.sleep() in a class: what is not in its group goes on
+            code.wait(threading.Event(), seconds)
 
     def kill(self, node: str, reason: str = "killed by the test") -> None:
         """Let a node fail, so that its ``on_failure`` applies."""
@@ -265,11 +281,17 @@ class SystemTest(TestedSystem):
     def _before_handler(
         self, node: str, handler: str | None, act: Callable[[], None], what: str
     ) -> None:
-        model = self._node(node).model
-        if model.behavior is None:
-            raise self._failure(f"{node} has no behavior that could {what}")
+        found = self._node(node)
+        model = found.model
+        if model.behavior is None and model.hosted_class is None:
+            raise self._failure(f"{node} has no behavior and no class that could {what}")
+        handlers = self._faults.handlers(model.full_name)
+        # A method of a class may become a callback later.
+        instance = getattr(found, "instance", None)
+        if handler and handlers and handler not in handlers and not hasattr(instance, handler):
+            raise unknown(f"{node} has no handler '{handler}'", handler, handlers)
         self._observation.on_action(f"let {node} {what}")
-        self._faults.before_next_handler(model.name.value, handler, act)
+        self._faults.before_next_handler(model.full_name, handler, act)
 
 
 def _converted(content: Any, kind: Any, where: str) -> Any:

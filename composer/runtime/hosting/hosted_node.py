@@ -143,7 +143,7 @@ class HostedNode(LocalNode):
         """Call a handler of a lifecycle node class."""
         name = f"on_{transition}"
         state = LifecycleState(self._start_state, _STATE_IDS.get(self._start_state, 0))
-        answer = getattr(instance.node, name)(state)
+        answer = instance.instrumented(name, getattr(instance.node, name))(state)
         if answer == TransitionCallbackReturn.FAILURE:
             raise TransitionFailed(f"{name} returned FAILURE")
         if answer != TransitionCallbackReturn.SUCCESS:

@@ -51,6 +51,13 @@ class UserCode:
         self.threads: list[threading.Thread] = []
         self._waits: dict[int, threading.Event] = {}  # by the threads that wait
 
+    def instrumented(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a callback of the class, with the faults of a test if there is one."""
+        instruments = self.context.instruments
+        if instruments is None:
+            return function
+        return instruments.callback(self.context.names["node"], name, function)
+
     def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
         """Block until ``event`` is set, in code of the class; return false after the time.
 
@@ -111,12 +118,12 @@ class UserFunction:
     def __init__(self, code: UserCode, function: Callable[..., Any]) -> None:
         self._context = code.context  # by which a call on a stack is recognized
         self.code = code
-        self._function = function
         self.is_async = inspect.iscoroutinefunction(function)
         #: Whether the last call, or the last step of a coroutine, has blocked.
         self.blocks = False
         self.__name__ = getattr(function, "__name__", type(function).__name__)
         self.__qualname__ = getattr(function, "__qualname__", self.__name__)
+        self._function = code.instrumented(self.__name__, function)
 
     @calls_user_code
     def __call__(self, *arguments: Any, **options: Any) -> Any:

@@ -135,6 +135,31 @@ def test_deadlines_and_serialized_messages(tmp_path: Path) -> None:
         assert overdue.raw == [3]
 
 
+@pytest.mark.parametrize("real_time", [False, True])
+def test_faults_in_classes(tmp_path: Path, *, real_time: bool) -> None:
+    path = tmp_path / "demo.yaml"
+    path.write_text(DEMO)
+    with SystemTest(path, real_time=real_time) as system:
+        nodes = instances(system)
+
+        def is_logged(text: str) -> bool:
+            return any(text in line.text for line in system.log)
+
+        with pytest.raises(TestFailure, match="counter has no handler 'tik'; did you mean 'tick'"):
+            system.raise_in("counter", "tik")
+        system.raise_in("listener", "on_number", error="no memory")
+        system.raise_in("timers", error="no disk")
+        system.run_until(lambda: is_logged("no memory") and is_logged("no disk"), 5.0)
+        count = nodes["counter"].count
+        system.hang("counter", 1.0)
+        system.advance(0.9)
+        assert nodes["counter"].count <= count + 1
+        system.run_until(lambda: nodes["counter"].count > count + 10, 5.0)
+        system.raise_in("counter", "on_deactivate", error="no power")
+        with pytest.raises(TestFailure, match=r"'deactivate' of counter failed: .*no power"):
+            system.transition("counter", "deactivate")
+
+
 @pytest.mark.parametrize(
     ("node", "lines"),
     [

@@ -81,10 +81,13 @@ class HostedTimerPort(TimerPort):
         timer.__class__ = HostedTimer
         timer._port, timer._is_canceled = self, is_canceled
         context = instance.context_for(timer.callback_group)
-        self._function = instance.function(self._call_back, timer, context)
+        name = "" if timer.callback is None else name_of(timer.callback).rpartition(".")[2]
+        call_back: Any = partial(self._call_back)
+        call_back.__name__ = name or "rate"  # of its counters, and of what faults of a test act on
+        self._function = instance.function(call_back, timer, context)
         super().__init__(context, self._model(context), None, self._function)
-        if timer.callback is not None:
-            self._name = self._function.__name__ = name_of(timer.callback).rpartition(".")[2]
+        if name:
+            self._name = name
         if self._is_rate:
             self.follow()
 
