@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
 from typing import Any
 
@@ -11,6 +12,7 @@ from rclpy.callback_groups import (
     ReentrantCallbackGroup,
 )
 from rclpy.node import Node
+from rclpy.service import Service
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Port
@@ -21,6 +23,7 @@ from composer.runtime.callbacks.user_code import UserCode
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import Reply
 from composer.runtime.executors.strand import Strand
 from composer.runtime.host_options import Instruments
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
@@ -68,6 +71,11 @@ class NodeContext(UserCode):
     def stamp(self) -> Any:
         """Return the node's time as a builtin_interfaces/msg/Time."""
         return self.node.get_clock().now().to_msg()
+
+    def serve(self, service: Service, callback: Callable[[Any, Reply], None]) -> None:
+        """Call ``callback(request, reply)`` for a service that no port declares."""
+        self.loop.add_service(service, callback)
+        self.router.offer(service, self.loop.call_soon, callback)
 
     def group_of(self, port: Port) -> CallbackGroup:
         """Return the callback group of a port: the shared one unless the port is reentrant."""

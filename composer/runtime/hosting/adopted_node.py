@@ -88,12 +88,11 @@ class AdoptedNode(Node):
     def _add_logger_services(self, lasting: Any) -> None:
         """Let other nodes change the level of the logger, in every state."""
         instance = self._composer_instance
+        context = instance.context
         before = len(lasting._services)
-        LoggerServices(lasting, instance.context.loop.clock, instance.context.log.warn)
+        LoggerServices(lasting, context.loop.clock, context.log.warn)
         for service in lasting._services[before:]:
-            instance.context.loop.add_service(
-                service, rclpy_callback(service, instance.context.loop.run_task)
-            )
+            context.serve(service, rclpy_callback(service, context.loop.run_task))
             instance.lasting_services.append(service)
 
     # --- what all instances of a node share

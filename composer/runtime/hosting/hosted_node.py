@@ -179,6 +179,7 @@ class HostedNode(LocalNode):
             executor.shutdown(0.0)
         for service in instance.lasting_services:
             self.loop.remove(service)
+            self._context.router.withdraw(service)
             self._ros.destroy_service(service)
         has_failed = outcome is not None and outcome.transition == "configure"
         self._declared = instance.declared

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
@@ -21,7 +21,12 @@ from composer.runtime.intra_process.ignore_local_publications import (
     unsupported_reason,
 )
 from composer.runtime.intra_process.publisher import GatedPublisher, PublisherContext
-from composer.runtime.intra_process.servers import LocalActionServer, LocalService
+from composer.runtime.intra_process.servers import (
+    CallSoon,
+    LocalActionServer,
+    LocalService,
+    Receive,
+)
 from composer.runtime.intra_process.taps import tap_of
 from composer.runtime.intra_process.time_limits import Leases, Receiver
 from composer.runtime.intra_process.topic import (
@@ -191,7 +196,20 @@ class LocalRouter:
 
     def add_service(self, port: Port, service: LocalService) -> Remove:
         """Offer ``service`` to clients of the process; return a function that stops that."""
-        return self._add(self._services, port, service)
+        return self._add(self._services, channel_of(port), service)
+
+    def offer(self, service: Any, call_soon: CallSoon, receive: Receive) -> None:
+        """Offer a service that no port declares, such as a node's parameter services.
+
+        In virtual time only: otherwise, its clients use the middleware.
+        """
+        name = service.service_name
+        local = LocalService(name, service.srv_type, call_soon, receive)
+        self._add(self._services, (ChannelKind.SERVICE, name), local)
+
+    def withdraw(self, service: Any) -> None:
+        """End :meth:`offer`."""
+        self._services.pop((ChannelKind.SERVICE, service.service_name), None)
 
     def service_lookup(self, port: Port) -> Callable[[], LocalService | None]:
         """Return a function that returns the local service of a client port now, if any."""
@@ -199,7 +217,7 @@ class LocalRouter:
 
     def add_action_server(self, port: Port, server: LocalActionServer) -> Remove:
         """Offer ``server`` to action clients of the process; return a function that stops that."""
-        return self._add(self._action_servers, port, server)
+        return self._add(self._action_servers, channel_of(port), server)
 
     def action_server_lookup(self, port: Port) -> Callable[[], LocalActionServer | None]:
         """Return a function that returns the local server of an action client port now, if any."""
@@ -212,8 +230,7 @@ class LocalRouter:
         key = channel_of(port)
         return self._topics.setdefault(key, Topic()) if self._is_local(key) else None
 
-    def _add(self, servers: dict[ChannelKey, S], port: Port, server: S) -> Remove:
-        key = channel_of(port)
+    def _add(self, servers: dict[ChannelKey, S], key: ChannelKey, server: S) -> Remove:
         if not self._is_local(key):
             return _do_nothing
         servers[key] = server

@@ -29,12 +29,19 @@ Receive = Callable[[Any, Any], None]
 class LocalService:
     """Passes requests to ``receive`` on the service's loop, and responses back."""
 
-    def __init__(self, port: Port, service_type: Any, call_soon: CallSoon, receive: Receive):
-        self._name = port.full_name
+    def __init__(
+        self,
+        full_name: str,
+        service_type: Any,
+        call_soon: CallSoon,
+        receive: Receive,
+        isolation: Isolation = Isolation.COPY,
+    ) -> None:
+        self._name = full_name
         self._response_type = service_type.Response
         self._call_soon = call_soon
         self._receive = receive
-        self._isolated = port.isolation is Isolation.COPY
+        self._isolated = isolation is Isolation.COPY
 
     def call(self, request: Any, response: Future[Any]) -> None:
         """Send a request, from any thread; it sets the result of ``response``.
@@ -49,8 +56,12 @@ class LocalService:
         try:
             self._receive(request, reply)
         except BaseException:
-            reply(self._response_type())
+            reply.send_empty()
             raise
+
+    def empty(self) -> Any:
+        """Return an empty response."""
+        return self._response_type()
 
     def checked(self, response: Any) -> Any:
         """Return a response as the caller gets it. Raises TypeError."""
@@ -74,6 +85,10 @@ class _LocalReply:
         future = self._waiting()
         if future is not None:
             future.set_result(checked)
+
+    def send_empty(self) -> None:
+        """Set an empty result, as by DDS if a callback raises."""
+        self(self._service.empty())
 
     def refuse(self, error: BaseException) -> None:
         """Fail the caller's future."""

@@ -96,9 +96,9 @@ class Lifecycle(ManagedLifecycle):
             self._machine = rclpy_implementation.LifecycleStateMachine(node.handle, services)
         self._services: list[Service] = []
         if services:
-            self._add_services()
+            self._add_services(context)
 
-    def _add_services(self) -> None:
+    def _add_services(self, context: NodeContext) -> None:
         self._services = _services(self._node, self._machine)
         callbacks: tuple[Callable[[Any, Reply], None], ...] = (
             self._on_change_state,
@@ -108,7 +108,7 @@ class Lifecycle(ManagedLifecycle):
             partial(self._on_get_transitions, "transition_graph"),
         )
         for service, callback in zip(self._services, callbacks, strict=True):
-            self._loop.add_service(service, callback)
+            context.serve(service, callback)
 
     @property
     def state(self) -> str:

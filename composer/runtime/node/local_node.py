@@ -23,6 +23,7 @@ from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import rclpy_callback
 from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
@@ -121,6 +122,9 @@ class LocalNode(ABC):
         if offers.logger_services:
             LoggerServices(self._ros, self.loop.clock, self._context.log.warn)
         self.loop.add_node(self._ros)
+        for service in self._ros.services:
+            answer = rclpy_callback(service, self.loop.run_task)
+            options.router.offer(service, self.loop.call_soon, answer)
         self.lifecycle = Lifecycle(
             self._context_of_transitions(),
             self,
@@ -186,6 +190,8 @@ class LocalNode(ABC):
     def destroy(self) -> None:
         """Destroy the node in any state. No transition is possible afterwards."""
         self._release()
+        for service in self._ros.services:
+            self._context.router.withdraw(service)
         self.lifecycle.destroy()
         self._context.clock.close()
         self.loop.remove_node(self._ros)

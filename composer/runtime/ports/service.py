@@ -94,7 +94,9 @@ class ServicePort(RunningPort):
         tap = CallTap.of_port(context.router.recorder, port, self._type, context.loop.clock)
         receive = tap.recorded(self.on_request)
         context.loop.add_service(self._service, receive)
-        local = LocalService(port, self._type, context.loop.call_soon, receive)
+        local = LocalService(
+            port.full_name, self._type, context.loop.call_soon, receive, port.isolation
+        )
         self._remove = context.router.add_service(port, local)
 
     def on_request(self, content: Any, reply: Reply) -> None:

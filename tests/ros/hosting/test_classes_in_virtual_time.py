@@ -135,6 +135,30 @@ def test_deadlines_and_serialized_messages(tmp_path: Path) -> None:
         assert overdue.raw == [3]
 
 
+OPERATED = f"""
+system: operated
+nodes:
+  operator: {{class: "{TIMED}:Operator", arguments: {{target: TARGET}}}}
+  talker: {{class: "{CLASSES}:Talker", introspection: {{logger_services: true}}}}
+  ticker:
+    parameters: {{period: {{type: double, default: 0.1}}}}
+    introspection: {{logger_services: true}}
+"""
+
+
+@pytest.mark.parametrize("real_time", [False, True])
+@pytest.mark.parametrize("target", ["/talker", "/ticker"])
+def test_services_of_other_nodes(tmp_path: Path, target: str, *, real_time: bool) -> None:
+    path = tmp_path / "operated.yaml"
+    path.write_text(OPERATED.replace("TARGET", target))
+    with SystemTest(path, real_time=real_time) as system:
+        operator = instances(system)["operator"]
+        system.run_until(lambda: len(operator.seen) == 9, 20.0)
+        states = [True, "inactive", True, "active", False, "active"]
+        assert operator.seen == [*states, True, 0.5, True]
+        assert system.states[target[1:]] == "active"
+
+
 @pytest.mark.parametrize("real_time", [False, True])
 def test_faults_in_classes(tmp_path: Path, *, real_time: bool) -> None:
     path = tmp_path / "demo.yaml"

@@ -7,13 +7,17 @@ import time
 from typing import Any
 
 from composer_interfaces.action import Navigate
-from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.srv import SetParameters
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import LoggerLevel, ParameterEvent
+from rcl_interfaces.srv import SetLoggerLevels, SetParameters
 from rclpy.action import ActionClient
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Int64
@@ -91,6 +95,34 @@ class Unserved(Node):
         self.get_logger().info(f"found: {found} at {self.get_clock().now().nanoseconds}")
         client.call_async(SetParameters.Request())
         self.create_subscription(ParameterEvent, "/parameter_events", print, 1)
+
+
+class Operator(Node):
+    """Sets a parameter of another node, restarts the node, and reads the parameter, once."""
+
+    def __init__(self, target: str) -> None:
+        super().__init__("operator")
+        self.seen: list[object] = []
+        self.target = target
+        self.parameters = AsyncParameterClient(self, target)
+        self.change = self.create_client(ChangeState, f"{target}/change_state")
+        self.state = self.create_client(GetState, f"{target}/get_state")
+        self.levels = self.create_client(SetLoggerLevels, f"{target}/set_logger_levels")
+        self.timer = self.create_timer(0.1, self.operate)
+
+    async def operate(self) -> None:
+        self.timer.cancel()
+        wanted = Parameter("period", value=0.5)
+        (result,) = (await self.parameters.set_parameters([wanted])).results
+        for transition in ("deactivate", "activate", "no_such"):
+            request = ChangeState.Request(transition=Transition(label=transition))
+            self.seen.append((await self.change.call_async(request)).success)
+            state = (await self.state.call_async(GetState.Request())).current_state
+            self.seen.append(state.label)
+        (value,) = (await self.parameters.get_parameters(["period"])).values
+        level = LoggerLevel(name=self.target[1:], level=LoggerLevel.LOG_LEVEL_WARN)
+        levels = self.levels.call_async(SetLoggerLevels.Request(levels=[level]))
+        self.seen += [result.successful, value.double_value, (await levels).results[0].successful]
 
 
 class WaitsForever(Node):
