@@ -52,17 +52,21 @@ class Owners:
     def named(self, name: str, module: Module, *, with_api: bool) -> Owner | None:
         """Return the owner with the short name of a class, None for classes of others.
 
-        Names of the API for behaviors are also names of rclpy. A message is looked for first in
-        the packages that the module imports.
+        Names of the API for behaviors are also names of rclpy, and ``Clock`` is one of a message.
+        A message is looked for first in the packages that the module or a port uses.
         """
         if name in self._groups:
             return self._groups[name]
-        full = self._full_name(name, module)
+        is_of_api = with_api and name in API_CLASSES
+        used = self._used_packages(module)
+        known = self.messages.get(name, ())
+        full_names = sorted(known, key=lambda full: _package(full) not in used)
         imported = module.imports.get(name)
         is_of_rclpy = name == "Parameter" and (imported is None or imported.module[:5] == "rclpy")
-        if full is not None and not is_of_rclpy:
-            return self.message(full)
-        if not with_api or name not in API_CLASSES:
+        is_message = bool(full_names) and not is_of_rclpy
+        if is_message and (_package(full_names[0]) in used or not is_of_api):
+            return self.message(full_names[0])
+        if not is_of_api:
             return None
         names = tuple(item for item in dir(getattr(behavior, name)) if not item.startswith("_"))
         return Owner(Family.PORT, names, is_api=True)
@@ -89,15 +93,11 @@ class Owners:
         whole = self.interfaces.find(base) if found is None and base else None
         return found if whole is None else parts(whole).get(part.lower())
 
-    def _full_name(self, short: str, module: Module) -> str | None:
-        return next(iter(self._by_use(self.messages.get(short, ()), module)), None)
-
-    def _by_use(self, names: Iterable[str], module: Module) -> list[str]:
-        """Return interfaces, those of packages that the module or a port uses first."""
-        used = {item.module.partition(".")[0] for item in module.imports.values()}
+    def _used_packages(self, module: Module) -> set[str]:
+        """Return the packages that the module imports, and those of the types of ports."""
         ports = (port for node in self._behaviors.values() for port in node.ports)
-        used |= {port.interface.value.partition("/")[0] for port in ports}
-        return sorted(names, key=lambda name: name.partition("/")[0] not in used)
+        imported = {item.module.partition(".")[0] for item in module.imports.values()}
+        return imported | {_package(port.interface.value) for port in ports}
 
     @cached_property
     def _groups(self) -> dict[str, Owner]:
@@ -122,6 +122,10 @@ class Owners:
                 for part in _PARTS[folder]:
                     found.setdefault(f"{short}_{part}", []).append(f"{name}_{part}")
         return found
+
+
+def _package(interface: str) -> str:
+    return interface.partition("/")[0]
 
 
 def _group(node: Node, names: Iterable[str]) -> Owner:

@@ -13,3 +13,4 @@ class Robot:
         self.cuont += 1
         self.log.warning("done")
         self.timers.tick.cancel()
+        self.start_s = self.clock.now_s()
