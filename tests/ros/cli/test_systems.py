@@ -327,3 +327,27 @@ def test_a_failed_bring_up_ends_the_background_process(path: Path) -> None:
     # The limit is long enough to reach the node that hangs on a busy machine.
     late = "rolling back because of /fleet/planner: bring-up timed out after 5 s"
     expect_error(late, "run", path, "--timeout", 5, "--set", "planner.fault=hang", "--grace", 3)
+
+
+WARNING = """\
+system: s
+nodes:
+  b: {on_activate: {log: hi}}  # compose: ignore[qos-implicit]
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "color"),
+    [
+        ("validate", "\x1b[1;33mwarning["),
+        ("graph", "1 warning: see"),
+        ("diff", "1 warning: see"),
+        ("run --dry-run", "1 warning: see"),
+    ],
+)
+def test_warnings_are_not_red_on_a_terminal(tmp_path: Path, command: str, color: str) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text(WARNING, encoding="utf-8")
+    shown = on_a_terminal(*command.split(), str(file))
+    assert color in shown
+    assert not re.search(r"\x1b\[[0-9;]*31m", shown)
