@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
@@ -18,6 +19,10 @@ from composer.python_code.checker.relevance import Relevance, reassigned
 from composer.python_code.lookup import BrokenModule
 from composer.python_code.problems import Family, Problem
 
+#: Findings in one file that are read, as each costs time. A real file has a few.
+MAX_FINDINGS = 500
+_TOO_MANY = f"the type checker reports more than {MAX_FINDINGS} places; the rest is not shown"
+
 
 @dataclass(slots=True)
 class Check:
@@ -27,6 +32,7 @@ class Check:
     _interfaces: Interfaces
     _copies: Mapping[str, Copy]
     _process: Process
+    _unread: list[tuple[str, Span]] = field(default_factory=list)  # first places after the limit
 
     @classmethod
     def start(cls, files: FileSet, stubs: Mapping[str, str], interfaces: Interfaces) -> Check:
@@ -66,7 +72,9 @@ class Check:
                 if seen.isdisjoint(keys):
                     found.append((finding.path, problem))
             seen |= keys | {(finding.path, about) for about in reader.follow_ups}
-        return found
+        return found + [
+            (path, Problem(Family.NOT_CHECKED, _TOO_MANY, span)) for path, span in self._unread
+        ]
 
     def _syntax_problems(self, refused: set[str]) -> Iterator[tuple[str, Problem]]:
         """Yield the files that Python cannot parse, those that the checker can parse as info."""
@@ -94,6 +102,9 @@ class Check:
                 or not copy.is_inserted(finding.line, finding.column)
             ):
                 by_path.setdefault(finding.path, []).append((finding, _span(finding, copy)))
+        for path, in_file in by_path.items():
+            self._unread += ((path, span) for _, span in in_file[MAX_FINDINGS : MAX_FINDINGS + 1])
+            del in_file[MAX_FINDINGS:]
         codes = {path: CodeIndex(self._copies[path].module) for path in by_path}
         attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
         classes = frozenset(name for module in self._files.modules for name in module.classes)

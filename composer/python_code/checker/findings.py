@@ -12,9 +12,9 @@ import sys
 from collections.abc import Iterable
 from dataclasses import field
 
-from composer.base.diagnostics import nearest, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
+from composer.base.spelling import vocabulary
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
 from composer.python_code.checker.owners import Owners
@@ -65,6 +65,7 @@ MISSING_RETURN = "missing an explicit `return`"
 _NAME = r"Could not find name `(\w+)`"
 _FUNCTION = r"in function `([\w.]+)`"
 _CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
+_MANY = 50  # names that a misspelled import may have bound
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
 _OF_MESSAGE = r"(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)"
@@ -147,9 +148,9 @@ class Reader:
 
     def _is_meant(self, name: str) -> None:
         """Leave out the names that follow from a misspelled import."""
-        meant = {x for x in self.code.names if _is_near(x, name)}
+        meant = {*vocabulary(tuple(self.code.names)).close(name, _MANY)}
         if name[:1].isupper():  # another class may have been meant
-            meant |= {x for x in self.code.names if x[:1].isupper()}
+            meant |= self.code.class_names
         self.follow_ups += [f"name {x}" for x in meant]
 
     def _attribute(self) -> Problem | None:
@@ -186,7 +187,10 @@ class Reader:
 
     def _members(self, class_name: str) -> set[str]:
         api = () if self._is_class else self.owners.attributes
-        return {*_members(self.code, class_name), *(item.removeprefix("self.") for item in api)}
+        return {
+            *self.code.members.get(class_name, ()),
+            *(item.removeprefix("self.") for item in api),
+        }
 
     def _unawaited_value(self) -> Problem:
         """Return the problem of a name that was assigned without 'await', where it was."""
@@ -272,9 +276,8 @@ class Reader:
         elif name in API_CLASSES:
             hint = f"add 'from composer.behavior import {name}'"
         else:
-            module = self.code.module
-            names = self.code.names | {*module.imports, *module.classes}
-            alike = [x for x in names - {name} if x[:1].lower() == name[:1].lower()]
+            initial = name[:1].lower()
+            alike = self.code.names_by_initial.get(initial, ())
             hint = _did_you_mean(name, alike) or "import it, or define it"
         return self._in_its_words(hint=hint)
 
@@ -349,11 +352,8 @@ def _meant(message: str) -> str | None:
 
 
 def _did_you_mean(name: str, names: Iterable[str]) -> str | None:
-    return suggestion(name, [other for other in names if other != name], limit=0)
-
-
-def _is_near(name: str, other: str) -> bool:
-    return nearest(name, [other]) is not None
+    close = (other for other in vocabulary(tuple(names)).close(name, 2) if other != name)
+    return next((f"did you mean '{other}'?" for other in close), None)
 
 
 def _plain(text: str) -> str:
@@ -381,13 +381,3 @@ def _part_hint(expected: str, given: str) -> str | None:
         return "add '.to_msg()'"
     base, _, part = expected.rpartition("_")
     return f"use '{base}.{part}'" if base and given.startswith(base) else None
-
-
-def _members(code: CodeIndex, class_name: str) -> set[str]:
-    """Return the methods of a class and the attributes of its own that it uses."""
-    for node in code.classes:
-        if node.name == class_name:
-            used = [item for item in ast.walk(node) if isinstance(item, ast.Attribute)]
-            names = {item.attr for item in used if dotted(item) == f"self.{item.attr}"}
-            return names | {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
-    return set()

@@ -13,7 +13,7 @@ from collections.abc import Container, Iterable
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.python_code.checker.code_index import CodeIndex, arguments_of
+from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.trees import dotted, is_none
 
@@ -93,12 +93,8 @@ class Relevance:
         """Return whether the code is such that a finding in its line says little."""
         if kind not in _KINDS or re.search(_NUMPY, message) or self.code.is_guarded(span.line):
             return True
-        names = self.code.names_in(span.line)
-        if not self.code.alternatives.isdisjoint(name.partition(".")[0] for name in names):
-            return True
-        return not self.reassigned.isdisjoint(re.findall(r"\w+", span.text)) or any(
-            self._has_several_classes(name, span.line) for name in names
-        )
+        is_reassigned = not self.reassigned.isdisjoint(re.findall(r"\w+", span.text))
+        return is_reassigned or self.code.has_loose_names(span.line)
 
     def _is_kept(self, kind: str, message: str, span: Span) -> bool:
         if kind == "unbound-name":
@@ -144,23 +140,6 @@ class Relevance:
         is_field = isinstance(value, ast.Attribute) and value.attr not in self.attributes
         return is_field and name != "NoneType"
 
-    def _has_several_classes(self, name: str, line: int) -> bool:
-        """Return whether a name gets objects of different classes.
-
-        Which one it has may depend on a condition, such as the distribution of ROS.
-        """
-        classes: set[str] = set()
-        for value in self.code.values_of(name, line):
-            made = dotted(value.func) if isinstance(value, ast.Call) else ""
-            last = made.rpartition(".")[2]
-            if made in self.code.alternatives:
-                return True
-            if isinstance(value, ast.Call) and last.startswith("create_"):
-                classes.add(ast.unparse(value.args[0]) if value.args else last)
-            elif last[:1].isupper():
-                classes.add(made)
-        return len(classes) > 1
-
     def _is_loose(self, match: re.Match[str], node: ast.expr | None, *, is_ros: bool) -> bool:
         """Return whether the value of an argument may have the right type after all."""
         given, expected = match["given"], match["expected"] or ""
@@ -195,12 +174,7 @@ class Relevance:
         name = dotted(node)
         values = self.code.values_of(name, node.lineno) if name.startswith("self.") else ()
         used = {name, *(dotted(value) for value in values)}
-        return any(
-            argument.arg in used and argument.annotation is not None
-            for function in self.code.functions
-            if f"self.{function.name}" not in self.code.passed_on  # rclpy decides about callbacks
-            for argument in arguments_of(function)
-        )
+        return not self.code.annotated_arguments.isdisjoint(used)
 
 
 def reassigned(code: CodeIndex, lines: Iterable[int]) -> frozenset[str]:
@@ -246,10 +220,10 @@ def unguarded_value(code: CodeIndex, span: Span, message: str) -> str | None:
     name = dotted(node)
     function, class_ = code.function_at(span.line), code.class_at(span.line)
     if not name.startswith("self."):
-        is_checked = bool(name) and function is not None and _is_checked(function, name)
+        is_checked = bool(name) and function is not None and code.is_checked(function, name)
         return None if is_checked else ast.unparse(node)[:_LONGEST]
     name = ".".join(name.split(".")[:2])
-    if class_ is None or _is_checked(class_, name):
+    if class_ is None or code.is_checked(class_, name):
         return None
     values = (
         value
@@ -257,26 +231,3 @@ def unguarded_value(code: CodeIndex, span: Span, message: str) -> str | None:
         if getattr(code.function_at(value.lineno), "name", "") in _STARTS
     )
     return name if all(map(is_none, values)) else None
-
-
-def _is_checked(scope: ast.AST, name: str) -> bool:
-    """Return whether a class or function reads a value other than by its members or as an argument.
-
-    It then compares the value, tests it or stores it elsewhere.
-    """
-    loads = uses = 0
-    for node in ast.walk(scope):
-        match node:
-            case ast.Attribute(ctx=ast.Load()) | ast.Name(ctx=ast.Load()) if dotted(node) == name:
-                loads += 1
-        match node:
-            case ast.Attribute(value=value) | ast.Subscript(value=value):
-                used = [value]
-            case ast.BinOp(left=left, right=right):
-                used = [left, right]
-            case ast.Call(func=function, args=arguments, keywords=keywords):
-                used = [function, *arguments, *(keyword.value for keyword in keywords)]
-            case _:
-                used = []
-        uses += sum(dotted(item) == name for item in used)
-    return loads > uses

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from composer.base.diagnostics import Severity
+from composer.python_code.checker import check as check_module
 from composer.python_code.checker import pyrefly
 from tests.unit.support.checking import diagnostics_in
+from tests.unit.support.growth import assert_linear
 
 SYSTEM = """\
 system: demo
@@ -28,6 +31,7 @@ BAD_CHECKERS = {
     "prints another form": ("print('{\"errors\": [{}]}')", "its output has an unknown form"),
     "prints deep JSON": ("print('{\"errors\":' + '[' * 100_000)", "it failed: exit code 0"),
     "never ends": ("time.sleep(600)", "it took longer than 2 s"),
+    "computes": ("signal.raise_signal(signal.SIGXCPU)", "it needed too much processor time"),
     "wants memory": ("time.sleep(0.2); bytearray(3_000_000_000)", "it failed: MemoryError"),
     "fills the disk": (
         "signal.signal(signal.SIGXFSZ, signal.SIG_DFL); time.sleep(0.2);"
@@ -94,3 +98,38 @@ def test_a_file_for_a_newer_python_is_a_note(tmp_path: Path) -> None:
     assert (found.rule.name, found.severity) == ("not-checked", Severity.INFO)
     assert "cannot parse the file, which needs a newer one" in found.message
     assert found.primary.line == 3
+
+
+#: By name: the begin of a file, and a line with a problem that is repeated with numbers for ``#``.
+PROBLEMS = {
+    "attributes": ("    def on_tick(self):\n", "        self.a# = self.b#\n"),
+    "one attribute": ("    def on_tick(self):\n", "        self.a = self.b#\n"),
+    "fields": (
+        "    def on_tick(self):\n        message = String()\n",
+        "        message.dta# = 1\n",
+    ),
+    "names": ("", "    def m#(self): undefined_name_#()\n"),
+    "none": (
+        "    def __init__(self):\n        self.a = None\n",
+        "    def m#(self): self.a.b#()\n",
+    ),
+    "imports": ("    def on_tick(self):\n", "        import no_module_#\n"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("begin", "line"), PROBLEMS.values(), ids=PROBLEMS)
+def test_growth_with_problems(
+    begin: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+    def check(count: int) -> None:
+        head = "from std_msgs.msg import String\nclass Counter:\n"
+        lines = "".join(line.replace("#", str(number)) for number in range(count))
+        (tmp_path / "code.py").write_text(f"{head}{begin}{lines}# {time.monotonic_ns()}\n")
+        found = diagnostics_in(SYSTEM, tmp_path)
+        is_limited = any("the rest is not shown" in item.message for item in found)
+        assert is_limited == (count > check_module.MAX_FINDINGS)
+
+    assert_linear(check, 250, 1_500)
