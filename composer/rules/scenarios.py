@@ -191,9 +191,11 @@ def _unknown_node(context: Context, name: Located[str], node: str) -> Iterator[D
 
 
 def _is_replaced(context: Context, node: str) -> bool:
-    scenario = context.scenario
-    patterns = () if scenario is None else scenario.replaced
-    return any(matches_wildcard(pattern, node) for pattern in patterns)
+    return any(matches_wildcard(pattern, node) for pattern in context.once(_replaced))
+
+
+def _replaced(context: Context) -> tuple[str, ...]:
+    return () if context.scenario is None else tuple(dict.fromkeys(context.scenario.replaced))
 
 
 def _unknown_channel(

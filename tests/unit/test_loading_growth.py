@@ -181,6 +181,46 @@ def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
     assert_linear(validate, 50_000, 400_000)
 
 
+SECTION = "/n#: {ros__parameters: {a: 1}}\n"
+
+
+def test_parameters_for_many_programs(tmp_path: Path) -> None:
+    sections = (SECTION.replace("#", str(number)) for number in range(5_000))
+    (tmp_path / "parameters.yaml").write_text("".join(sections))
+    nodes = "  p${i}: {for_each: {i: 1000}, executable: {package: a, name: b}}\n"
+    text = f"system: large\nparameter_files: parameters.yaml\nnodes:\n{nodes}"
+    loading = load_bytes(text.encode(), tmp_path, shown="large.yaml")
+    assert loading.diagnostics[-1].message == (
+        "with this node, the nodes get more than 1,000,000 sections of parameter files, "
+        "counting each node again"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("section", "part"),
+    [
+        ("expect", "  - {message: /t, where: message.data == 'x#', within_s: 0.5}\n"),
+        ("steps", "  - {publish: {/t: {data: hello #}}}\n"),
+        ("steps", "  - {when: {log: 'x#'}, drop: {/t: {count: 1}}}\n"),
+        ("expect", "  - {state: {n#: active}}\n"),
+    ],
+)
+def test_large_scenarios(tmp_path: Path, section: str, part: str) -> None:
+    port = f"{{{STRING}, topic: /t, qos: command}}"
+    (tmp_path / "small.yaml").write_text(
+        f"system: small\nnodes: {{n: {{publishers: {{p: {port}}}, subscriptions: {{s: {port}}}}}}}"
+    )
+
+    def validate(size: int) -> None:
+        parts = "".join(part.replace("#", str(number)) for number in range(size // len(part)))
+        content = f"scenario: s\nsystem: small.yaml\nfor_s: 9\n{section}:\n{parts}".encode()
+        loading = load_bytes(content, tmp_path, shown="scenario.yaml")
+        assert loading.system is not None
+
+    assert_linear(validate, 30_000, 240_000)
+
+
 NODE_TYPE = "node: big\npublishers:\n" + "".join(f"  p{n}: {{{STRING}}}\n" for n in range(400))
 PARAMETERS = ", ".join(f"a{number}: 1" for number in range(5_001))
 LOG = f"log: '{{{' + '.join(['1'] * 30)} + ${{i}}}}'"

@@ -11,7 +11,11 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
-from composer.language.document.limits import MAX_DECLARED_VALUES, TooManyErrors
+from composer.language.document.limits import (
+    MAX_DECLARED_VALUES,
+    MAX_PASSED_SECTIONS,
+    TooManyErrors,
+)
 from composer.language.rules import TOO_LARGE
 from composer.language.tree import Entry, Mapping, Sequence, Tree
 from composer.language.tree_values import (
@@ -91,20 +95,38 @@ class SystemContext:
 
 @dataclass(slots=True)
 class DeclaredValues:
-    """The number of keys and values that nodes declare; each node counts its node type again."""
+    """What all nodes have, to limit it. Raises TooManyErrors beyond the limits.
 
-    count: int = 0
+    ``values`` are keys and values that nodes declare; each node counts its node type again.
+    ``sections`` are the sections of parameter files that nodes get.
+    """
+
+    values: int = 0
+    sections: int = 0
 
     def add(self, size: int, span: Span, diagnostics: list[Diagnostic]) -> None:
-        """Add the size of a node. Raises TooManyErrors beyond the limit."""
-        self.count += size
-        if self.count > MAX_DECLARED_VALUES:
+        """Add the values of a node."""
+        self.values += size
+        if self.values > MAX_DECLARED_VALUES:
             message = (
                 f"with this node, the nodes declare more than {MAX_DECLARED_VALUES:,} values, "
                 "counting expressions by their length"
             )
-            hint = "split the system"
-            raise TooManyErrors(diagnostics, Diagnostic(TOO_LARGE, message, span, hint=hint))
+            raise _too_large(message, "split the system", span, diagnostics)
+
+    def add_sections(self, size: int, span: Span, diagnostics: list[Diagnostic]) -> None:
+        """Add the sections that a node gets."""
+        self.sections += size
+        if self.sections > MAX_PASSED_SECTIONS:
+            message = (
+                f"with this node, the nodes get more than {MAX_PASSED_SECTIONS:,} sections of "
+                "parameter files, counting each node again"
+            )
+            raise _too_large(message, "split the parameter files", span, diagnostics)
+
+
+def _too_large(message: str, hint: str, span: Span, diagnostics: list[Diagnostic]) -> TooManyErrors:
+    return TooManyErrors(diagnostics, Diagnostic(TOO_LARGE, message, span, hint=hint))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +172,8 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         gets_undeclared=gets_undeclared,
         is_program=declared.implementation.executable is not None and external is None,
     )
+    size = parameters.sections_from_files
+    context.declared.add_sections(size, entry.key.span, context.diagnostics)
     is_complete = made.complete and not declared.implementation.conflicting
     overridden = partial(with_overrides, overrides=parameters.qos_overrides)
     if transforms is not None:

@@ -213,6 +213,7 @@ class NodeParameters:
     """The parameters of a node, and what its program gets; see Node for the fields.
 
     ``qos_overrides`` are those of ``parameters`` that override the QoS of a port, by name.
+    ``sections_from_files`` counts the sections that match the node or are passed to its program.
     """
 
     parameters: tuple[Parameter, ...]
@@ -221,6 +222,7 @@ class NodeParameters:
     sections: tuple[ParameterSection, ...]
     qos_overrides: Map[str, Parameter]
     unknown: tuple[UnknownKey, ...]
+    sections_from_files: int
 
 
 def sections_of(files: ParameterFiles) -> tuple[ParameterSection, ...]:
@@ -267,6 +269,7 @@ def node_parameters(
         sections,
         overrides,
         (*(UnknownKey("parameters", item.name, ()) for item in unusable), *unknown),
+        len(given.files.names_for(names.full_name)) + len(sections),
     )
 
 
@@ -312,12 +315,12 @@ def without_sections_of_others(nodes: list[Node]) -> tuple[Node, ...]:
 
     An external node may be one of the program.
     """
-    started = (node for node in nodes if node.external is None)
+    started = [node for node in nodes if node.external is None]
     known = {name for node in started for name in (node.full_name, *node.inner_nodes)}
 
     def without_others(node: Node) -> Node:
-        others = known - {node.full_name, *node.inner_nodes}
-        sections = (item for item in node.parameter_sections if item.name not in others)
+        own = {node.full_name, *node.inner_nodes}
+        sections = (x for x in node.parameter_sections if x.name in own or x.name not in known)
         return replace(node, parameter_sections=tuple(sections))
 
     return tuple(without_others(node) if node.parameter_sections else node for node in nodes)
