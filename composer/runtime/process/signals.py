@@ -48,12 +48,17 @@ class WakeupSocket:
         with suppress(BlockingIOError):  # full: the next wait ends anyway
             os.write(self.fd, b"\0")
 
+    def clear(self) -> None:
+        """Forget the wake-ups so far; the numbers of signals are among them."""
+        with suppress(BlockingIOError):
+            self._reader.recv(_READ_BYTES)
+
     def wait(self, until_s: float = math.inf) -> bool:
         """Sleep until a wake-up; return False if ``until_s`` (monotonic) comes first."""
         while not self._poll.poll(self._milliseconds_until(until_s)):
             if self._clock.monotonic() >= until_s:
                 return False
-        self._reader.recv(_READ_BYTES)
+        self.clear()
         return True
 
     def __del__(self) -> None:
@@ -78,7 +83,8 @@ def stop_signals(
     """Call ``stop(name of the signal)`` for each signal, on the main thread.
 
     Python calls signal handlers between two instructions of the main thread, which therefore must
-    sleep only in ``wakeup.wait()``. ``stop`` must not acquire a lock that the main thread may hold.
+    sleep only in ``wakeup.wait()``. ``stop`` must wake that, and must not acquire a lock that the
+    main thread may hold.
 
     If the process ends after this (``ends_process``), signals are ignored from then on, so that
     another Ctrl-C does not kill the process before it has reported the outcome.
@@ -90,6 +96,8 @@ def stop_signals(
         return
 
     def handle(number: int, _: FrameType | None) -> None:
+        if isinstance(wakeup, WakeupSocket):
+            wakeup.clear()  # the watchdog sees that the signal is handled
         stop(signal.Signals(number).name)
 
     before = {number: signal.signal(number, handle) for number in STOP_SIGNALS}

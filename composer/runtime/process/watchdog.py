@@ -1,10 +1,14 @@
 """A small process that ends a system whose C code keeps the interpreter's lock.
 
 Python notes a signal without the lock and writes its number to the socket that wakes the main
-loop. The watchdog looks at the same socket. A number that is still there after the time limit
-means that no signal handler runs: a regular expression, for example, keeps the lock until it has
-its result. Like the watchdog of systemd, this one sends SIGABRT, which prints the stacks, and
-then SIGKILL. It runs this file as a program and imports only the standard library.
+loop. The signal handler reads the socket, and the watchdog polls it. A number that is still
+there after the time limit means that no signal handler runs: a regular expression, for example,
+keeps the lock until it has its result. Like the watchdog of systemd, this one sends SIGABRT, which
+prints the stacks, and then SIGKILL. It runs this file as a program and imports only the standard
+library.
+
+Time in which the system cannot run does not count: while a debugger or SIGSTOP stops it, while the
+computer sleeps, and, after a second signal, while other programs use all processors.
 """
 
 from __future__ import annotations
@@ -24,9 +28,12 @@ from contextlib import contextmanager, suppress
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 #: A second signal ends the process after this time.
 _URGENT_S = 1.0
+#: Tools that forward signals send a second one along with the terminal's.
+_SAME_REQUEST_S = 0.1
 _INTERVAL_S = 0.25
-_STACKS_WITHIN_S = 0.5
+_STACKS_WITHIN_S = 2.0
 _PACKET_BYTES = 65_536
+_STOPPED = b"Tt"
 
 
 @contextmanager
@@ -54,34 +61,79 @@ def signal_watchdog(wakeup_fd: int, limit_s: float) -> Iterator[None]:
 
 def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:
     """Return when the process has ended, or has been ended."""
+    descriptor = os.pidfd_open(process)  # the number may be reused once the process has ended
     poll = select.poll()
     poll.register(wakeup, select.POLLIN)
-    unread_since_s: float | None = None
+    poll.register(descriptor, select.POLLIN)
     while os.getppid() == process:
         poll.poll()
-        content = b"\0"
-        with suppress(BlockingIOError):  # meanwhile, the main thread has read it
-            content = wakeup.recv(_PACKET_BYTES, socket.MSG_PEEK)
-        signals = [number for number in content if number in STOP_SIGNALS]
-        now_s = time.monotonic()
-        if not signals:
-            unread_since_s = None
-        elif unread_since_s is None:
-            unread_since_s = now_s
-        elif now_s - unread_since_s > (min(limit_s, _URGENT_S) if signals[1:] else limit_s):
-            _end(process, signal.Signals(signals[0]).name)
+        time.sleep(_SAME_REQUEST_S)
+        number = _unhandled(wakeup, process, limit_s)
+        if number is not None:
+            _end(descriptor, signal.Signals(number).name)
             return
         time.sleep(_INTERVAL_S)
 
 
-def _end(process: int, name: str) -> None:
+def _unhandled(wakeup: socket.socket, process: int, limit_s: float) -> int | None:
+    """Return the signal that is not handled within the limit; None if there is none any more."""
+    first = signals = _unread(wakeup)
+    waited_s = ran_s = 0.0
+    seen_s, delays_s = time.monotonic(), _delays_s(process)
+    while signals and not _is_stopped(process):
+        time.sleep(_INTERVAL_S)
+        now_s, now_delays_s = time.monotonic(), _delays_s(process)
+        passed_s = min(now_s - seen_s, 2 * _INTERVAL_S)  # the computer may have slept
+        late_s = (delay_s - delays_s.get(task, delay_s) for task, delay_s in now_delays_s.items())
+        waited_s += passed_s
+        ran_s += max(0.0, passed_s - max(late_s, default=0.0))
+        seen_s, delays_s = now_s, now_delays_s
+        signals = _unread(wakeup)
+        is_urgent = len(signals) > len(first) and ran_s > _URGENT_S
+        if signals and (waited_s > limit_s or is_urgent):
+            return signals[0]
+    return None
+
+
+def _unread(wakeup: socket.socket) -> list[int]:
+    """Return the numbers of the signals that no handler has read."""
+    try:
+        content = wakeup.recv(_PACKET_BYTES, socket.MSG_PEEK)
+    except BlockingIOError:
+        return []
+    return [number for number in content if number in STOP_SIGNALS]
+
+
+def _is_stopped(process: int) -> bool:
+    content = _read(f"/proc/{process}/stat")
+    return content.rpartition(b") ")[2][:1] in _STOPPED
+
+
+def _delays_s(process: int) -> dict[str, float]:
+    """Return for each thread how long it was ready to run and had no processor."""
+    delays_s = {}
+    with suppress(OSError):
+        for task in os.scandir(f"/proc/{process}/task"):
+            words = _read(f"{task.path}/schedstat").split()
+            delays_s[task.name] = int(words[1]) / 1e9 if words else 0.0
+    return delays_s
+
+
+def _read(path: str) -> bytes:
+    """Return a short file; nothing if it cannot be read, as of a thread that has ended."""
+    with suppress(OSError), open(path, "rb") as file:  # noqa: PTH123 - pathlib is slow to import
+        return file.read()
+    return b""
+
+
+def _end(descriptor: int, name: str) -> None:
     text = f"compose: {name} was not handled, as C code keeps the interpreter's lock; ending\n"
     with suppress(OSError):
         os.write(2, text.encode())
     for number in (signal.SIGABRT, signal.SIGKILL):
         with suppress(ProcessLookupError):
-            os.kill(process, number)
-        time.sleep(_STACKS_WITHIN_S)
+            signal.pidfd_send_signal(descriptor, number)
+        select.select([descriptor], [], [], _STACKS_WITHIN_S)
 
 
 if __name__ == "__main__":

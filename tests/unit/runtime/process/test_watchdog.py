@@ -1,0 +1,80 @@
+"""The watchdog ends no process that handles its signals as soon as it can run."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+IN_ORDER = 7
+GRACE_S = 3.0
+#: Python code on the main thread, which handles signals and does not wait for them.
+BUSY = """
+print("holding", flush=True)
+end_s = time.monotonic() + 2.5
+while time.monotonic() < end_s:
+    pass
+"""
+#: C code on another thread, which keeps the interpreter's lock.
+HOLDING = """
+library = ctypes.PyDLL(None)
+library.write(1, b"holding\\n", 8)
+library.usleep(2_000_000)
+"""
+PROGRAM = """
+import ctypes, os, sys, threading, time
+from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.process.signals import WakeupSocket, stop_signals
+from composer.runtime.process.watchdog import signal_watchdog
+
+wakeup, reasons = WakeupSocket(COMPUTER), []
+
+def stop(reason):
+    reasons.append(reason)
+    wakeup.wake()
+
+def hold():
+    exec(sys.argv[2])
+
+with stop_signals(stop, wakeup, ends_process=True), signal_watchdog(wakeup.read_fd, 3.0):
+    if sys.argv[1] == "main":
+        hold()
+    else:
+        threading.Thread(target=hold).start()
+    while not reasons:
+        wakeup.wait()
+os._exit(7)
+"""
+
+
+@pytest.mark.parametrize(
+    ("thread", "code", "steps"),
+    [
+        ("main", BUSY, ((signal.SIGINT, 0.5), (signal.SIGTERM, 0.0))),
+        (
+            *("other", HOLDING),
+            ((signal.SIGINT, 0.1), (signal.SIGSTOP, GRACE_S + 1.0), (signal.SIGCONT, 0.0)),
+        ),
+        ("other", HOLDING, ((signal.SIGINT, 0.01), (signal.SIGTERM, 0.0))),
+    ],
+    ids=["python", "stopped", "forwarded"],
+)
+def test_a_process_that_ends_in_order(
+    thread: str, code: str, steps: tuple[tuple[int, float], ...]
+) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, thread, code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        for number, pause_s in steps:
+            process.send_signal(number)
+            time.sleep(pause_s)  # the times of the signals are what is tested
+        _, errors = process.communicate(timeout=60.0)
+    assert (process.returncode, errors) == (IN_ORDER, "")
