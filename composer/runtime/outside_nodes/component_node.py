@@ -29,6 +29,8 @@ from composer.runtime.ros.messages import MessageError, interface_class
 
 #: How long an unloaded node may stay in the ROS graph.
 _GONE_WITHIN_S = 1.0
+#: What is kept of a text of a container, in characters: nodes, reports and logs repeat it.
+_LONGEST_TEXT = 1000
 #: Messages of composition_interfaces, which need not be installed.
 _Message: TypeAlias = Any
 
@@ -236,9 +238,9 @@ class LoadedComponent(RemoteServices):
                         return full_name
                 elif response.success:
                     self.unique_id = int(response.unique_id)
-                    return str(response.full_node_name)
+                    return str(response.full_node_name)[:_LONGEST_TEXT]
                 else:
-                    reason = response.error_message.strip() or "it does not say why"
+                    reason = response.error_message[:_LONGEST_TEXT].strip() or "it does not say why"
                     raise LoadFailed(f"{self.container.full_name} cannot load it: {reason}")
         finally:
             self._loading.remove_pending_request(future)

@@ -44,6 +44,8 @@ CAMERA = """
     container: container
     publishers: {words: {type: std_msgs/msg/String, external: true}}
 """
+#: In characters; a container may send more.
+LONG = 2000
 LIST = "/robot/container/_container/list_nodes"
 
 
@@ -108,6 +110,7 @@ def test_load_unload_crash_and_reload(rounds: int, tmp_path: Path, peer: Peer) -
     ("component", "more", "reason"),
     [
         ('plugin: "demo::Broken"', "", "cannot load it: Component constructor threw an exception"),
+        ('plugin: "demo::Verbose"', "", "threw an exception: no camera"),
         ('plugin: "demo::Talkr"', "", "Failed to find class with the requested plugin name"),
         ('plugin: "demo::Stubborn"', "", "has given it the name /talker"),
         (
@@ -119,7 +122,7 @@ def test_load_unload_crash_and_reload(rounds: int, tmp_path: Path, peer: Peer) -
         (
             'plugin: "demo::Talker"',
             "services: {reset: {type: std_srvs/srv/Trigger, external: true}}",
-            "it has no service /robot/reset after 1.5 s",
+            "it has no service /robot/reset after 5 s",
         ),
     ],
 )
@@ -129,13 +132,14 @@ def test_a_failed_load_says_why_and_leaves_nothing(
     odd = f"""
   odd:
     required: false
-    component: {{package: demo, {component}, ready_timeout_ms: 1500}}
+    component: {{package: demo, {component}, ready_timeout_ms: 5000}}
     container: container
     {more}
 """
     with running(robot(odd), tmp_path) as system:
         failed = wait_until(lambda: failures(system, "/robot/odd"), "its fault")[0]
         assert reason in failed.reason
+        assert len(failed.reason) < LONG
         wait_until(lambda: system.node("odd").state == "unconfigured", "its state")
         is_kept = "reports a failure" in reason  # for the next attempt, as a process is
         assert loaded(peer) == ["/robot/odd"] * is_kept

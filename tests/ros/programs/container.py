@@ -49,6 +49,11 @@ class Broken(Node):
         raise RuntimeError("no camera is connected")
 
 
+class Verbose(Node):
+    def __init__(self, **_: Any) -> None:
+        raise RuntimeError("no camera\n" * 1000)
+
+
 class Slow(Talker):
     """Takes longer than a second, after which other requests are sent again."""
 
@@ -65,7 +70,8 @@ class Stubborn(Talker):
         super().__init__(**options)
 
 
-PLUGINS = {f"demo::{kind.__name__}": kind for kind in (Talker, Camera, Broken, Slow, Stubborn)}
+KINDS = (Talker, Camera, Broken, Verbose, Slow, Stubborn)
+PLUGINS = {f"demo::{kind.__name__}": kind for kind in KINDS}
 
 
 class Container(Node):
