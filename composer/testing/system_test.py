@@ -31,7 +31,6 @@ from composer.model.names import matches_wildcard
 from composer.runtime.executors.futures import Future
 from composer.runtime.hosting.user_code import current_code
 from composer.runtime.node.local_node import LocalNode
-from composer.runtime.node.managed_node import InProcessNode
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.testing import faults
 from composer.testing.bag_messages import messages_of
@@ -158,7 +157,7 @@ class SystemTest(TestedSystem):
     def set_parameter(self, node: str, name: str, value: Any) -> None:
         """Set a parameter. Raises TestFailure if it is refused."""
         found = self._node(node)
-        if not isinstance(found, InProcessNode):
+        if not isinstance(found, LocalNode):
             raise self._failure(f"{node} does not run in this process")
         self._observation.on_action(f"set {node}.{name} to {short(value)}")
         declared = {item.name.value: item.type.value for item in found.model.parameters}

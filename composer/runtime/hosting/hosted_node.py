@@ -85,7 +85,7 @@ class HostedNode(LocalNode):
         simulated = self._overrides.pop(USE_SIM_TIME, None)
         if simulated is not None:
             self._ros.set_parameters([simulated])
-        self._join(options)
+        self._join()
         self._shared = SharedState(self._ros)
         self._declare_initial_parameters()
 

@@ -22,8 +22,8 @@ from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.members.lives import REPORTS_WITHIN_S
 from composer.runtime.metrics.repeat_limit import RepeatLimit
+from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.managed_node import (
-    InProcessNode,
     ManagedNode,
     TransitionOutcome,
 )
@@ -70,7 +70,7 @@ async def _response(call: NodeCall, nodes: Mapping[str, ManagedNode]) -> Mapping
         return None
     if service in _LIFECYCLE_SERVICES:
         response = await _lifecycle_response(node, request)
-    elif isinstance(node, InProcessNode):
+    elif isinstance(node, LocalNode):
         services = node.parameter_services
         response = await node.loop.run_task(services.answer(service, request, kind.Response()))
     else:

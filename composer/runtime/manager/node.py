@@ -29,7 +29,8 @@ from composer.runtime.manager.graph_view import GraphObserver, ManagerQueries
 from composer.runtime.manager.member_service import MemberCallbacks, MemberService, answer_calls
 from composer.runtime.manager.other_instances import OtherInstances
 from composer.runtime.manager.publishing import ReportPublisher, ReportSources
-from composer.runtime.node.managed_node import InProcessNode, ManagedNode
+from composer.runtime.node.local_node import LocalNode
+from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
@@ -220,7 +221,7 @@ class ManagerNode:
         return {self._node.get_fully_qualified_name(): own} | {
             name: (node.loop, node.parameter_services)
             for name, node in self._host.nodes().items()
-            if isinstance(node, InProcessNode)
+            if isinstance(node, LocalNode)
         }
 
     def _add_service(self, kind: Any, name: str, callback: Callable[[Any, Reply], None]) -> None:

@@ -7,7 +7,7 @@ The kinds of nodes differ in what they create and call in a transition. See
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
@@ -28,7 +28,7 @@ from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
-from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
+from composer.runtime.node.managed_node import ManagedNode, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
@@ -52,7 +52,7 @@ class LibraryNode(Protocol):
         """Release it, once its entities are destroyed."""
 
 
-class LocalNode(ABC):
+class LocalNode(ManagedNode):
     """A :class:`.ManagedNode` of this process.
 
     Create it before its loop is started, or on the loop.
@@ -73,13 +73,8 @@ class LocalNode(ABC):
         statistics: Statistics | None = None,
     ) -> None:
         """Continue ``statistics``."""
-        self.model = model
-        self.loop = loop
-        self.activations = 0  # how often it became active
-        #: When, by the clock of the loop, the work of its last transition started.
-        self.transition_started_s = 0.0
-        self.statistics = Statistics() if statistics is None else statistics
-        self.transition_timeout_s = options.transition_timeout_s
+        statistics = Statistics() if statistics is None else statistics
+        super().__init__(model, loop, statistics, options.transition_timeout_s)
         self._listener = listener
         self._system_is_up = options.system_is_up
         self._start_state = ""  # of the current transition
@@ -111,7 +106,7 @@ class LocalNode(ABC):
         self._always_on_context = replace(self._context, gate=always_on_gate)
         self._keeps_entities = False
 
-    def _join(self, options: NodeOptions) -> None:
+    def _join(self) -> None:
         """Join the ROS graph, unconfigured; the parameters are declared."""
         offers = self.model.introspection
         self.parameter_services = ParameterServices(
@@ -128,19 +123,9 @@ class LocalNode(ABC):
         self.lifecycle = Lifecycle(
             self._context_of_transitions(),
             self,
-            timeout_s=options.transition_timeout_s,
+            timeout_s=self._timeout_s,
             services=offers.lifecycle_services,
         )
-
-    @property
-    def full_name(self) -> str:
-        """The name ROS knows the node by."""
-        return self.model.full_name
-
-    @property
-    def state(self) -> str:
-        """The label of the lifecycle state, as ROS tools see it."""
-        return self.lifecycle.state
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""
@@ -165,13 +150,6 @@ class LocalNode(ABC):
     def fail(self, reason: str) -> None:
         """Report that the node has failed."""
         self._listener.on_fault(FaultKind.REPORTED, reason)
-
-    def sent(self, publisher: str) -> int:
-        """Return how many messages a publisher has sent."""
-        return self.statistics.publisher(publisher).count
-
-    def limit_end(self, end_s: float) -> None:  # noqa: B027  nothing to do is the default
-        """Do nothing: transitions have a time limit, and the loop interrupts callbacks."""
 
     @property
     def callback_owners(self) -> tuple[object, ...]:

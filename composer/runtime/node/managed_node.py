@@ -1,11 +1,12 @@
 """What the supervision knows of a node, whatever implements it and wherever it runs."""
+# ruff: noqa: B027  nothing to do is the default of many methods
 
 from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Protocol
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
@@ -15,7 +16,6 @@ from composer.runtime.metrics.statistics import Statistics
 
 if TYPE_CHECKING:  # tests of the supervision run without ROS
     from composer.runtime.executors.loop import Loop
-    from composer.runtime.node.parameter_services import ParameterServices
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class ManagedLifecycle(ABC):
             transition, self.state, success=False, reason=reason, requested=False, outdated=True
         )
 
-    def fail_request(self) -> None:  # noqa: B027  nothing to do is the default
+    def fail_request(self) -> None:
         """Answer a pending request of an external node: its transition hangs. Thread-safe."""
 
     @abstractmethod
@@ -135,41 +135,51 @@ class ManagedLifecycle(ABC):
         """Run a transition; the lock has been acquired, and is to be released at the end."""
 
 
-class ManagedNode(Protocol):
-    """A node of a running system. Methods may be called from any thread unless they say else."""
+class ManagedNode(ABC):
+    """A node of a running system. Methods may be called from any thread unless they say else.
 
-    model: Node
-    loop: Loop
-    statistics: Statistics
-    activations: int  # how often it became active
-    #: When, by the clock of the loop, the work of its last transition started.
-    transition_started_s: float
+    What most nodes outside the process cannot do is nothing by default.
+    """
 
-    @property
-    def lifecycle(self) -> ManagedLifecycle:
-        """Its transitions."""
+    lifecycle: ManagedLifecycle
+
+    def __init__(self, model: Node, loop: Loop, statistics: Statistics, timeout_s: float) -> None:
+        """``timeout_s`` is the limit of each transition."""
+        self.model = model
+        self.loop = loop
+        self.statistics = statistics
+        self.activations = 0  # how often it became active
+        #: When, by the clock of the loop, the work of its last transition started.
+        self.transition_started_s = 0.0
+        self._timeout_s = timeout_s
 
     @property
     def full_name(self) -> str:
         """The name ROS knows the node by."""
+        return self.model.full_name
 
     @property
     def state(self) -> str:
         """The label of the lifecycle state."""
+        return self.lifecycle.state
 
     @property
     def transition_timeout_s(self) -> float:
         """How long a transition may take before it counts as stuck."""
+        return self._timeout_s
 
     @property
-    def callback_owners(self) -> Sequence[object]:
+    def callback_owners(self) -> tuple[object, ...]:
         """The objects by which a running callback on a stack is recognized as the node's."""
+        return ()
 
+    @abstractmethod
     def now_s(self) -> float:
         """Return the node's time in seconds."""
 
     def sent(self, publisher: str) -> int:
-        """Return how many messages a publisher has sent."""
+        """Return how many messages a publisher has sent, as far as this process knows."""
+        return self.statistics.publisher(publisher).count
 
     def count_errors(self) -> None:
         """Count errors as faults from now on: the system is up."""
@@ -183,14 +193,6 @@ class ManagedNode(Protocol):
     def keep_entities(self) -> None:
         """Do not destroy ports from now on: the end of the process does."""
 
+    @abstractmethod
     def destroy(self) -> None:
         """Destroy the node in any state, on its loop or once that has stopped."""
-
-
-@runtime_checkable
-class InProcessNode(ManagedNode, Protocol):
-    """A node with a ROS node in this process."""
-
-    @property
-    def parameter_services(self) -> ParameterServices:
-        """What answers requests to its parameter services, on its loop, if it has them or not."""

@@ -76,7 +76,7 @@ class RunningNode(LocalNode):
             self._ros, model.parameters, check=self._check_timers, changed=self._parameters_changed
         )
         self._context.names["parameters"] = parameters.values
-        self._join(options)
+        self._join()
 
     # --- transitions
 

@@ -66,20 +66,16 @@ class OutsideContext:
     nodes: Mapping[str, ManagedNode]
 
 
-class OutsideNode(ManagedLifecycle):
+class OutsideNode(ManagedNode, ManagedLifecycle):
     """A :class:`.ManagedNode` of another process, and its :class:`.ManagedLifecycle`.
 
     A subclass does the work of transitions, on the loop.
     """
 
     def __init__(self, model: Node, context: OutsideContext) -> None:
-        super().__init__()
-        self.model = model
-        self.loop = context.loop
-        self.activations = 0
-        self.transition_started_s = 0.0
-        self.statistics = context.statistics
-        self._timeout_s = context.timeout_s
+        ManagedNode.__init__(self, model, context.loop, context.statistics, context.timeout_s)
+        ManagedLifecycle.__init__(self)
+        self.lifecycle = self
         self._listener = context.listener
         self._logger = model.full_name.strip("/").replace("/", ".")
         self._state = UNCONFIGURED
@@ -94,24 +90,9 @@ class OutsideNode(ManagedLifecycle):
     # --- the managed node
 
     @property
-    def lifecycle(self) -> OutsideNode:
-        """Its transitions."""
-        return self
-
-    @property
-    def full_name(self) -> str:
-        """The name ROS knows the node by."""
-        return self.model.full_name
-
-    @property
     def state(self) -> str:
         """The label of the lifecycle state."""
         return self._state
-
-    @property
-    def transition_timeout_s(self) -> float:
-        """How long a transition may take before it counts as stuck."""
-        return self._timeout_s
 
     @property
     def is_absent(self) -> bool:
@@ -124,11 +105,6 @@ class OutsideNode(ManagedLifecycle):
         return False
 
     @property
-    def callback_owners(self) -> tuple[object, ...]:
-        """Nothing: its callbacks run elsewhere."""
-        return ()
-
-    @property
     def figures(self) -> Mapping[str, Any]:
         """What is known of it, by the names of the fields of ``NodeReport``."""
         return {}
@@ -137,22 +113,9 @@ class OutsideNode(ManagedLifecycle):
         """Return the system time in seconds."""
         return self.loop.clock.time()
 
-    def sent(self, publisher: str) -> int:
-        """Return how many messages a publisher has sent, as far as this process knows."""
-        return self.statistics.publisher(publisher).count
-
-    def count_errors(self) -> None:
-        """Do nothing: its errors are not known."""
-
-    def block(self) -> None:
-        """Do nothing: its callbacks are not known."""
-
     def limit_end(self, end_s: float) -> None:
         """Let nothing last longer than ``end_s`` from now on."""
         self._end_s = end_s
-
-    def keep_entities(self) -> None:
-        """Do nothing: it has none in this process."""
 
     @abstractmethod
     def destroy(self) -> None:
