@@ -70,8 +70,8 @@ class HealthMonitor:
         self._reported: set[tuple[str, str]] = set()  # nodes and their callbacks that block
         # What nodes of other processes send is not known here; those of the system check it there.
         own = [name for name, node in node_set.nodes.items() if node.model.in_process]
-        silences = {name: _NodeSilence(name, node_set) for name in own}
-        self._silences = {name: silence for name, silence in silences.items() if silence.has_limits}
+        self._silences = [item for name in own for item in _silences(name, node_set.nodes[name])]
+        self._silent: dict[str, _Activation] = {}  # nodes that were reported in their activation
         self._period_s = _period_s(node_set)
         self._checked_s = self._clock.monotonic()
         self._system_is_up = False
@@ -107,11 +107,15 @@ class HealthMonitor:
         """Check the publishers of nodes, except on blocked loops, which cannot publish."""
         interrupted = [item for item in self._callbacks.values() if item.interrupted_s is not None]
         blocked = {item.loop for item in interrupted} | self._node_set.hung
-        for name, silence in self._silences.items():
-            if self._node_set.nodes[name].loop.name not in blocked:
-                text = silence.check(now_s)
-                if text is not None:
-                    self._report(Fault(name, FaultKind.SILENCE, text, self._serial))
+        for silence in self._silences:
+            node = self._node_set.nodes[silence.node]
+            if node.state != PrimaryState.ACTIVE or node.loop.name in blocked:
+                continue
+            activation = (node, node.activations)
+            text = silence.check(activation, now_s)
+            if text is not None and self._silent.get(silence.node) != activation:
+                self._silent[silence.node] = activation
+                self._report(Fault(silence.node, FaultKind.SILENCE, text, self._serial))
 
     # --- callbacks
 
@@ -212,40 +216,8 @@ class HealthMonitor:
                 self._report(LoopRecovered(loop))
 
 
-class _NodeSilence:
-    """The silences of one node since it became active."""
-
-    def __init__(self, name: str, node_set: NodeSet) -> None:
-        self._name = name
-        self._node_set = node_set
-        watch = node_set.nodes[name].model.supervision.watch
-        self._silences: list[_Silence] = []
-        if watch.silence_ms is not None:
-            self._silences.append(_Silence(None, watch.silence_ms.value / 1000.0))
-        for topic, limit in watch.topics:
-            self._silences.append(_Silence(topic.value, limit.value / 1000.0))
-        self._has_failed = False
-        self._activation: tuple[ManagedNode, int] | None = None
-
-    @property
-    def has_limits(self) -> bool:
-        """Whether there is anything to check."""
-        return bool(self._silences)
-
-    def check(self, now_s: float) -> str | None:
-        """Return why the node has failed; at most once until it is activated again."""
-        node = self._node_set.nodes[self._name]
-        if self._activation != (node, node.activations):
-            self._activation = (node, node.activations)
-            self._has_failed = False
-            for silence in self._silences:
-                silence.restart()
-        if self._has_failed or node.state != PrimaryState.ACTIVE:
-            return None
-        texts = [silence.check(node, now_s) for silence in self._silences]
-        text = next(filter(None, texts), None)
-        self._has_failed = text is not None
-        return text
+#: A node and how often it had become active.
+_Activation = tuple[ManagedNode, int]
 
 
 @dataclass(slots=True)
@@ -257,23 +229,22 @@ class _Silence:
     it may have delayed the node as well.
     """
 
+    node: str
     publisher: str | None
     limit_s: float
-    sent: int = -1  # at the last check; -1: not checked since the activation
+    activation: _Activation | None = None  # at the last check
+    sent: int = 0  # at the last check
     silent_s: float = 0.0
     checked_s: float = 0.0
     checked_node_s: float = 0.0  # by the node's time
 
-    def restart(self) -> None:
-        """Forget earlier checks."""
-        self.sent = -1
-
-    def check(self, node: ManagedNode, now_s: float) -> str | None:
-        """Return a text if the silence exceeds the limit."""
+    def check(self, activation: _Activation, now_s: float) -> str | None:
+        """Return a text if the silence since the activation exceeds the limit."""
+        node, _ = activation
         sent = node.statistics.sent if self.publisher is None else node.sent(self.publisher)
         node_now_s = node.now_s()
-        if sent != self.sent:
-            self.sent, self.silent_s = sent, 0.0
+        if (activation, sent) != (self.activation, self.sent):
+            self.activation, self.sent, self.silent_s = activation, sent, 0.0
         else:
             passed_s = min(now_s - self.checked_s, node_now_s - self.checked_node_s)
             maximum_s = 2.0 * self.limit_s / _CHECKS_PER_LIMIT
@@ -283,6 +254,15 @@ class _Silence:
             return None
         subject = "silent" if self.publisher is None else f"silent on '{self.publisher}'"
         return f"{subject} for {1000.0 * self.limit_s:g} ms"
+
+
+def _silences(name: str, node: ManagedNode) -> list[_Silence]:
+    """Return what is to be checked of a node."""
+    watch = node.model.supervision.watch
+    found = [_Silence(name, topic.value, limit.value / 1000.0) for topic, limit in watch.topics]
+    if watch.silence_ms is not None:
+        found.insert(0, _Silence(name, None, watch.silence_ms.value / 1000.0))
+    return found
 
 
 def _period_s(node_set: NodeSet) -> float:
