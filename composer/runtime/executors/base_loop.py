@@ -9,10 +9,10 @@ from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable, Coroutine
 from math import floor, inf, isnan
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, TypeVar
 
 from composer.runtime.clock.clock import Clock
-from composer.runtime.executors.futures import Future
+from composer.runtime.executors.futures import Future, done_event
 from composer.runtime.executors.stacks import format_stacks
 from composer.runtime.executors.tasks import Report, Task, name_of
 
@@ -212,11 +212,26 @@ class BaseLoop(ABC):
         """
         if self.is_current():
             return function()
-        call = CrossThreadCall(function, self.clock)
-        self.call_soon(call.run)
-        if self._stopped and call.revoke():
+        result: Future[T] = Future()
+        right_to_start = [True]  # popping is atomic: started or revoked, never both
+
+        def call() -> None:
+            if not _take(right_to_start):
+                return
+            try:
+                result.set_result(function())
+            except BaseException as error:
+                result.set_exception(error)
+
+        self.call_soon(call)
+        if self._stopped and _take(right_to_start):
             raise RuntimeError(f"executor '{self._name}' has stopped")
-        return call.wait(timeout_s, self.current_stack)
+        if not self.clock.wait(done_event(result), timeout_s):
+            status = "was not started" if _take(right_to_start) else "is still running"
+            stack = self.current_stack()
+            at = f"; the loop is at:\n{stack}" if stack else ""
+            raise TimeoutError(f"'{name_of(function)}' {status} after {timeout_s:g} s{at}")
+        return result.result()
 
     def wait(self, event: threading.Event, timeout_s: float | None = None) -> None:
         """Block until ``event`` is set or the time is over. A loop that stops sets the event."""
@@ -242,47 +257,10 @@ class BaseLoop(ABC):
             traceback.print_exc()  # the handler itself failed
 
 
-class CrossThreadCall(Generic[T]):
-    """Calls ``function`` on the thread that calls :meth:`run`, for another thread that waits."""
-
-    def __init__(self, function: Callable[[], T], clock: Clock) -> None:
-        self._function = function
-        self._clock = clock
-        self._right_to_start = [True]  # popping is atomic: started or revoked, never both
-        self._done = threading.Event()
-        self._value: T | None = None
-        self._error: BaseException | None = None
-
-    def run(self) -> None:
-        """Call the function unless it was revoked. Raises nothing."""
-        if not self.revoke():
-            return
-        try:
-            self._value = self._function()
-        except BaseException as error:
-            self._error = error
-        self._done.set()
-
-    def revoke(self) -> bool:
-        """Prevent the call; return false if it has started or was revoked before."""
-        try:
-            self._right_to_start.pop()
-        except IndexError:
-            return False
-        return True
-
-    def wait(self, timeout_s: float | None, current_stack: Callable[[], str]) -> T:
-        """Return what the function returns, or raise what it raises.
-
-        Raises TimeoutError, with ``current_stack()``, if that takes longer; the function is not
-        started after that.
-        """
-        if not self._clock.wait(self._done, timeout_s):
-            status = "is still running" if not self.revoke() else "was not started"
-            stack = current_stack()
-            at = f"; the loop is at:\n{stack}" if stack else ""
-            name = name_of(self._function)
-            raise TimeoutError(f"'{name}' {status} after {timeout_s:g} s{at}")
-        if self._error is not None:
-            raise self._error
-        return cast("T", self._value)
+def _take(right: list[bool]) -> bool:
+    """Take a right, unless it is taken."""
+    try:
+        right.pop()
+    except IndexError:
+        return False
+    return True
