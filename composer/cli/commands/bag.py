@@ -105,7 +105,10 @@ def merge(
     *,
     topics: Topics = None,
 ) -> None:
-    """Write the messages of several bags to a new one, in the order of their times."""
+    """Write the messages of several bags to a new one.
+
+    The messages are sorted by time.
+    """
     _write(bags, selection(topics, 0.0, None), output, (None, None))
 
 
