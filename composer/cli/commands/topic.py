@@ -158,7 +158,7 @@ def pub(
             topic=full_name("topic", topic),
             type_name=type_name,
             build=compile_content(text, class_of(type_name), "the message"),
-            qos=with_policies(PRESETS["command"], preset, depth, reliability, durability),
+            qos=with_policies(PRESETS["command"], (preset, depth, reliability, durability)),
             rate_hz=rate,
             times=limit,
             wait_for=wait_for if wait_for is not None else int(limit is not None),

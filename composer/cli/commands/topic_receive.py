@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
@@ -52,6 +53,8 @@ QosReliability = Annotated[
 QosDurability = Annotated[
     Durability | None, typer.Option("--qos-durability", help="QoS durability.")
 ]
+#: The values of these four options.
+Policies: TypeAlias = tuple[str | None, int | None, Reliability | None, Durability | None]
 #: One option for both limits. Without it, only the discovery of the topic is limited.
 ReceiveTimeout = Annotated[
     float | None,
@@ -142,32 +145,54 @@ def echo(
     --qos-... options replace its policies.
     """
     expression = _filter(condition)
-    limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
-    with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
-        from composer.client.graph_names import full_name
-        from composer.client.messages.topics import Topics, TopicSubscription
+    policies = preset, depth, reliability, durability
+    with _subscription(topic, type_name, timeout, policies) as subscription:
         from composer.client.messages.values import part
         from composer.runtime.ros.messages import to_plain
 
-        topics = Topics(session, deadline)
+        left = 1 if once else count
+        for message in _messages(subscription, timeout):
+            if not _matches(expression, message):
+                continue
+            plain = to_plain(message if field is None else part(message, field))
+            plain = without_items(plain) if no_arr else plain
+            if json:
+                write(as_json(plain))
+            else:
+                shown = plain if full_length else truncated(plain, _MAX_LENGTH)
+                write(f"{as_yaml(shown)}\n---")
+            left = None if left is None else left - 1
+            if left == 0:
+                return
+
+
+@contextmanager
+def _subscription(
+    topic: str,
+    type_name: str | None,
+    timeout_s: float | None,
+    policies: Policies,
+    *,
+    measures: bool = False,
+    raw: bool = False,
+) -> Iterator[TopicSubscription]:
+    """Subscribe to a topic with the strictest profile that its publishers satisfy.
+
+    A subscription that ``measures`` gets no messages from before it; ``raw`` ones are serialized.
+    """
+    limit_s = DEFAULT_TIMEOUT_S if timeout_s is None else timeout_s
+    with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
+        from composer.client.graph_names import GraphNames, full_name
+        from composer.client.messages import topics
+        from composer.model.qos import strictest_compatible
+
         name = full_name("topic", topic)
-        message_type = type_name or topics.type_of(name)
-        profile = with_policies(topics.compatible_qos(name), preset, depth, reliability, durability)
-        with TopicSubscription(session, name, message_type, profile) as subscription:
-            left = 1 if once else count
-            for message in _messages(subscription, timeout):
-                if not _matches(expression, message):
-                    continue
-                plain = to_plain(message if field is None else part(message, field))
-                plain = without_items(plain) if no_arr else plain
-                if json:
-                    write(as_json(plain))
-                else:
-                    shown = plain if full_length else truncated(plain, _MAX_LENGTH)
-                    write(f"{as_yaml(shown)}\n---")
-                left = None if left is None else left - 1
-                if left == 0:
-                    return
+        message_type = type_name or GraphNames(session, deadline).only_type("topic", name)
+        strictest = topics.measuring_qos if measures else strictest_compatible
+        offers = topics.offered_profiles(session, name)
+        profile = with_policies(strictest(offers, topics.SUBSCRIPTION_DEPTH), policies)
+        with topics.TopicSubscription(session, name, message_type, profile, raw=raw) as found:
+            yield found
 
 
 def without_items(value: Any) -> Any:
@@ -204,16 +229,11 @@ def _matches(expression: Expression | None, message: Any) -> bool:
         raise RosError(f"--filter: {error}") from error
 
 
-def with_policies(
-    profile: QosProfile,
-    preset: str | None,
-    depth: int | None,
-    reliability: Reliability | None,
-    durability: Durability | None,
-) -> QosProfile:
+def with_policies(profile: QosProfile, policies: Policies) -> QosProfile:
     """Return ``profile``, or the preset, with the policies that are given."""
-    policies = {"depth": depth, "reliability": reliability, "durability": durability}
-    given: dict[str, Any] = {name: value for name, value in policies.items() if value is not None}
+    preset, *values = policies
+    pairs = zip(("depth", "reliability", "durability"), values, strict=True)
+    given: dict[str, Any] = {name: value for name, value in pairs if value is not None}
     return replace(profile if preset is None else PRESETS[preset], **given)
 
 
@@ -237,41 +257,34 @@ def hz(
 ) -> None:
     """Print the average rate of a topic every second."""
     expression = _filter(condition)
-    limit_s = DEFAULT_TIMEOUT_S if timeout is None else timeout
-    with ros_session("compose topic", limit_s, carries_messages=True) as (session, deadline):
-        from composer.client.graph_names import full_name
-        from composer.client.messages.topics import RateWindow, Topics, TopicSubscription
+    policies = preset, depth, reliability, durability
+    raw = expression is None  # serialized messages are enough to count them
+    with _subscription(topic, None, timeout, policies, measures=True, raw=raw) as subscription:
+        from composer.client.messages.topics import RateWindow
         from composer.client.session import Deadline
 
-        topics = Topics(session, deadline)
-        name = full_name("topic", topic)
-        message_type = topics.type_of(name)
-        profile = with_policies(topics.measuring_qos(name), preset, depth, reliability, durability)
-        # Serialized messages are enough to count them.
-        raw = expression is None
         rates = RateWindow(window)
         silence_s = float("inf") if timeout is None else timeout
         left = sys.maxsize if count is None else count
         unreported = 0
-        with TopicSubscription(session, name, message_type, profile, raw=raw) as subscription:
-            next_report, next_message = Deadline(_REPORT_EVERY_S), Deadline(silence_s)
-            while left:
-                wait = Deadline(min(next_report.left_s, next_message.left_s))
-                received = subscription.take(wait)
-                items = [item for item in received if _matches(expression, item.content)][:left]
-                for item in items:
-                    rates.add(item.at_s)
-                left -= len(items)
-                unreported += len(items)
-                if items:
-                    next_message = Deadline(silence_s)
-                elif next_message.passed:
-                    raise subscription.no_message_error(silence_s)
-                if next_report.passed:
-                    _report(name, rates.statistics(), unreported, json=json)
-                    unreported, next_report = 0, Deadline(_REPORT_EVERY_S)
+        next_report, next_message = Deadline(_REPORT_EVERY_S), Deadline(silence_s)
+        while left:
+            wait = Deadline(min(next_report.left_s, next_message.left_s))
+            received = subscription.take(wait)
+            items = [item for item in received if _matches(expression, item.content)][:left]
+            for item in items:
+                rates.add(item.at_s)
+            left -= len(items)
+            unreported += len(items)
+            if items:
+                next_message = Deadline(silence_s)
+            elif next_message.passed:
+                raise subscription.no_message_error(silence_s)
+            if next_report.passed:
+                _report(subscription.topic, rates.statistics(), unreported, json=json)
+                unreported, next_report = 0, Deadline(_REPORT_EVERY_S)
         if unreported:
-            _report(name, rates.statistics(), unreported, json=json)
+            _report(subscription.topic, rates.statistics(), unreported, json=json)
 
 
 def _report(topic: str, rate: RateStatistics | None, messages: int, *, json: bool) -> None:

@@ -16,7 +16,7 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message, serialize_message
 
 from composer.base.fast_dataclass import dataclass
-from composer.client.graph_names import GraphNames, full_name, type_mismatch_hint
+from composer.client.graph_names import full_name, type_mismatch_hint
 from composer.client.messages.values import Build, InvalidValueError, class_of
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, RosError, Session
@@ -25,7 +25,7 @@ from composer.model.qos import Durability, QosProfile, strictest_compatible
 from composer.runtime.metrics.figures import MessageRate
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
-_SUBSCRIPTION_DEPTH = 1000
+SUBSCRIPTION_DEPTH = 1000
 _ACKNOWLEDGED_WITHIN_S = 1
 
 
@@ -55,30 +55,6 @@ class Publication:
     rate_hz: float = 1.0
     times: int | None = None
     wait_for: int = 0
-
-
-class Topics:
-    """Looks up topics, all within one time limit."""
-
-    def __init__(self, session: Session, deadline: Deadline) -> None:
-        self._session = session
-        self._names = GraphNames(session, deadline)
-
-    def type_of(self, name: str) -> str:
-        """Return the type of a topic. Raises NotFoundError; RosError if there is more than one."""
-        return self._names.only_type("topic", name)
-
-    def compatible_qos(self, name: str) -> QosProfile:
-        """Return the strictest profile that all publishers of a topic satisfy."""
-        return strictest_compatible(self._offers(name), _SUBSCRIPTION_DEPTH)
-
-    def measuring_qos(self, name: str) -> QosProfile:
-        """Return such a profile with which no messages from before the subscription arrive."""
-        return measuring_qos(self._offers(name), _SUBSCRIPTION_DEPTH)
-
-    def _offers(self, name: str) -> list[QosProfile]:
-        publishers = self._session.graph.topic(name, ()).publishers
-        return [publisher.qos for publisher in publishers]
 
 
 class TopicSubscription:
@@ -119,6 +95,11 @@ class TopicSubscription:
         taken = list(self._received)
         self._received.clear()
         return taken
+
+
+def offered_profiles(session: Session, topic: str) -> list[QosProfile]:
+    """Return the QoS profiles of the publishers of a topic, by its full name."""
+    return [publisher.qos for publisher in session.graph.topic(topic, ()).publishers]
 
 
 def measuring_qos(offers: list[QosProfile], depth: int) -> QosProfile:
@@ -274,7 +255,6 @@ class RateWindow:
         )
 
 
-_DEPTH = 1000
 #: A message has its time already, so it may wait: polling costs less than a wake-up for each.
 _POLL_PERIOD_S = 0.002
 
@@ -295,7 +275,7 @@ def measure_rates(
         end_s = time.monotonic() + duration_s
         while time.monotonic() < end_s:
             for topic, samples in sampled.items():
-                for sample in samples.take(_DEPTH):
+                for sample in samples.take(SUBSCRIPTION_DEPTH):
                     rates[topic].add(sample.at_s)
             time.sleep(_POLL_PERIOD_S)
     known = {topic: rate.hertz for topic, rate in rates.items()}
@@ -303,10 +283,10 @@ def measure_rates(
 
 
 def _sample(session: Session, topic: str, types: tuple[str, ...]) -> SampledTopic | None:
-    publishers = session.graph.topic(topic, types).publishers
-    if not publishers or len(types) != 1:
+    offers = offered_profiles(session, topic)
+    if not offers or len(types) != 1:
         return None
-    qos = measuring_qos([publisher.qos for publisher in publishers], _DEPTH)
+    qos = measuring_qos(offers, SUBSCRIPTION_DEPTH)
     try:
         return SampledTopic(session.node, topic, types[0], qos, raw=True)
     except InvalidValueError:  # not installed, so it cannot be counted
