@@ -40,7 +40,7 @@ def config(
     from composer.model.assembly.canonical import canonical
 
     path = system_file(system)
-    result = load_system(path, shown=system, arguments=arguments)
+    result = load_system(path, system, arguments)
     if result.tree is None or not result.is_valid:
         raise typer.Exit(FAILED)
     whole = canonical(result.tree)

@@ -19,6 +19,7 @@ from composer.cli.support.process import (
 )
 from composer.cli.support.ros import require_ros
 from composer.cli.support.system_arguments import (
+    LoadOptions,
     ShowWarnings,
     complete_system,
     example_systems,
@@ -97,8 +98,8 @@ def dashboard(
     """
     descriptor = follow_parent()
     require_dashboard("compose dashboard")
-    overrides = (arguments or [], settings or [])
-    declared = None if system is None else _declared(system, overrides, namespace, autostart)
+    options: LoadOptions = {"settings": settings, "namespace": namespace}
+    declared = None if system is None else _declared(system, arguments, options, autostart)
     require_ros("compose dashboard", None if declared is None else declared.system)
     from composer.dashboard.access import InvalidTokenFileError
     from composer.dashboard.context import Options
@@ -143,10 +144,7 @@ def _open(url: str) -> None:
 
 
 def _declared(
-    text: str,
-    overrides: tuple[list[str], list[str]],
-    namespace: str | None,
-    autostart: Autostart | None,
+    text: str, arguments: list[str] | None, options: LoadOptions, autostart: Autostart | None
 ) -> Declared | None:
     """Return the system of a file; None for the name of a running system without a known file."""
     from composer.dashboard.declared import Declared
@@ -156,9 +154,7 @@ def _declared(
     if not is_file and text.rpartition("/")[2] not in {**project_systems(), **example_systems()}:
         return None
     name = text if is_file else text.rpartition("/")[2]
-    arguments, settings = overrides
-    system, path, result = runnable_system(
-        name, arguments, settings=settings, namespace=namespace, warnings=ShowWarnings.ALL
-    )
+    options["warnings"] = ShowWarnings.ALL
+    system, path, result = runnable_system(name, arguments, **options)
     goal = PrimaryState(autostart.value) if autostart is not None else None
     return Declared(system, str(path), tuple(result.diagnostics), goal)

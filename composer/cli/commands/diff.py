@@ -80,9 +80,7 @@ def diff(
 
     Exit code 1 if there are differences.
     """
-    declared = runnable_system(
-        system, arguments, settings=settings or (), namespace=namespace
-    ).system
+    declared = runnable_system(system, arguments, settings=settings, namespace=namespace).system
     compare = _comparison(declared, autostart, ignore or [])
     with ros_session("compose diff", timeout) as (session, deadline):
         from composer.client.snapshot import GraphObserver

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Unpack
 
 import typer
 
@@ -14,7 +14,12 @@ from composer.cli.support.hosts import files_to_copy, write_staying
 from composer.cli.support.name_values import Arguments
 from composer.cli.support.new_files import write_and_say
 from composer.cli.support.options import examples
-from composer.cli.support.system_arguments import RunnableSystem, SystemName, runnable_system
+from composer.cli.support.system_arguments import (
+    LoadOptions,
+    RunnableSystem,
+    SystemName,
+    runnable_system,
+)
 from composer.cli.support.terminal import lines, write, write_raw
 
 if TYPE_CHECKING:
@@ -133,14 +138,10 @@ def export_kubernetes(
 
 
 def exported_system(
-    text: str,
-    arguments: list[str] | None = None,
-    *,
-    namespace: str | None = None,
-    needs_values: bool = True,
+    text: str, arguments: list[str] | None = None, **options: Unpack[LoadOptions]
 ) -> RunnableSystem:
     """Return a system whose path can be a line of any format. Raises CommandError."""
-    found = runnable_system(text, arguments, namespace=namespace, needs_values=needs_values)
+    found = runnable_system(text, arguments, **options)
     if not str(found.path.resolve()).isprintable():
         raise CommandError(
             f"the path '{found.path}' has control characters", hint="rename the file or its folder"

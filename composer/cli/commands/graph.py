@@ -121,7 +121,7 @@ def _declared(names: list[str]) -> Scene:
     diagnostics: list[Diagnostic] = []
     names, arguments = split_arguments(names)
     for name in names:
-        result = load_system(system_file(name), shown=name, arguments=arguments)
+        result = load_system(system_file(name), name, arguments)
         if result.system is None:
             raise CommandError(f"'{name}' cannot be drawn because of its errors")
         systems.append(result.system)

@@ -79,8 +79,9 @@ def run(
     must be the same. The options apply to all processes.
     """
     require_hosts("compose hosts run")
-    loaded = load_for_hosts(system, arguments, settings or (), namespace, use_sim_time=use_sim_time)
-    result, declared, relative = loaded
+    result, declared, relative = load_for_hosts(
+        system, arguments, settings=settings, namespace=namespace, use_sim_time=use_sim_time
+    )
     require_ros("compose hosts run", declared)
     from composer.client.hosts.deployment import DeploymentOptions
     from composer.client.hosts.start import question_about, remote_processes, run_on_hosts

@@ -216,7 +216,7 @@ def _run(
 ) -> Replay:
     """Run the system on the bag. Raises BagError, CommandError."""
     name, arguments, settings = system
-    declared = runnable_system(name, arguments, settings=settings or ()).system
+    declared = runnable_system(name, arguments, settings=settings).system
     require_ros("compose replay", declared)
     require_interfaces(declared)
     require_modules(declared)

@@ -230,7 +230,7 @@ def run(
         runnable = runnable_system(
             system,
             arguments,
-            settings=settings or (),
+            settings=settings,
             namespace=namespace,
             use_sim_time=use_sim_time,
             # The coordinating process prints the warnings.

@@ -7,12 +7,12 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import typer
 
 from composer.cli.support.errors import CONFIG, FAILED, CommandError, require_extra
-from composer.cli.support.system_arguments import runnable_system
+from composer.cli.support.system_arguments import LoadOptions, runnable_system
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
@@ -54,22 +54,10 @@ def write_staying(files: CopiedFiles) -> None:
 
 
 def load_for_hosts(
-    text: str,
-    arguments: Sequence[str] | None = (),
-    settings: Sequence[str] = (),
-    namespace: str | None = None,
-    *,
-    use_sim_time: bool = False,
+    text: str, arguments: Sequence[str] | None = (), **options: Unpack[LoadOptions]
 ) -> tuple[LoadResult, System, Path]:
     """Return a system without errors, and its file relative to the project. Raises CommandError."""
-    system, path, result = runnable_system(
-        text,
-        arguments,
-        settings=settings,
-        namespace=namespace,
-        use_sim_time=use_sim_time,
-        exit_code=CONFIG,
-    )
+    system, path, result = runnable_system(text, arguments, exit_code=CONFIG, **options)
     if not system.hosts:
         raise CommandError(
             f"system '{system.name}' has no 'hosts'", hint="see docs/guides/several-computers.md"

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable
 from enum import Enum, auto
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple, TypedDict, Unpack
 
 import typer
 
@@ -173,16 +173,24 @@ class ShowWarnings(Enum):
     NONE = auto()
 
 
+class LoadOptions(TypedDict, total=False):
+    """How to load a system: the options of a command that override its values, and ``warnings``.
+
+    If it ``needs_values``, as by default, all arguments without a default have one.
+    """
+
+    settings: Iterable[str] | None
+    namespace: str | None
+    use_sim_time: bool
+    warnings: ShowWarnings
+    needs_values: bool
+
+
 def load_system(
     path: Path,
-    *,
-    shown: str | None = None,
+    shown: str,
     arguments: Iterable[str] | None = (),
-    settings: Iterable[str] = (),
-    namespace: str | None = None,
-    use_sim_time: bool = False,
-    warnings: ShowWarnings = ShowWarnings.COUNT,
-    needs_values: bool = True,
+    **options: Unpack[LoadOptions],
 ) -> LoadResult:
     """Read and check the system in ``path``; print errors, and warnings as chosen, to stderr.
 
@@ -193,19 +201,26 @@ def load_system(
     from composer.model.resolve import OverrideOptions
     from composer.report.text import render
 
+    overrides = OverrideOptions(
+        tuple(options.get("settings") or ()),
+        options.get("namespace"),
+        options.get("use_sim_time", False),
+        tuple(arguments or ()),
+    )
     result = load(
         path,
-        shown=str(path) if shown is None or not path_exists(Path(shown)) else shown,
-        overrides=OverrideOptions(tuple(settings), namespace, use_sim_time, tuple(arguments or ())),
-        needs_values=needs_values,
+        shown=shown if path_exists(Path(shown)) else str(path),
+        overrides=overrides,
+        needs_values=options.get("needs_values", True),
     )
+    warnings = options.get("warnings", ShowWarnings.COUNT)
     severities = {Severity.ERROR, *([Severity.WARNING] if warnings is ShowWarnings.ALL else [])}
     reported = [item for item in result.diagnostics if item.severity in severities]
     if reported:
         say_raw(render(reported, color=use_color(sys.stderr)))
     count = sum(item.severity is Severity.WARNING for item in result.diagnostics)
     if count and warnings is ShowWarnings.COUNT:
-        say(f"{counted(count, 'warning')}: see 'compose validate {shown or path}'")
+        say(f"{counted(count, 'warning')}: see 'compose validate {shown}'")
     return result
 
 
@@ -221,31 +236,17 @@ def runnable_system(
     text: str,
     arguments: Iterable[str] | None = (),
     *,
-    settings: Iterable[str] = (),
-    namespace: str | None = None,
-    use_sim_time: bool = False,
-    warnings: ShowWarnings = ShowWarnings.COUNT,
-    needs_values: bool = True,
     exit_code: int = FAILED,
+    **options: Unpack[LoadOptions],
 ) -> RunnableSystem:
     """Return the system of a SYSTEM argument; print its diagnostics as :func:`load_system` does.
 
-    ``arguments`` are values of its arguments, as ``name=value``; if it ``needs_values``, all
-    arguments without a default have one.
+    ``arguments`` are values of its arguments, as ``name=value``.
 
     Raises UsageError; CommandError or typer.Exit with ``exit_code`` if it is not runnable.
     """
     path = system_file(text)
-    result = load_system(
-        path,
-        shown=text,
-        arguments=arguments,
-        settings=settings,
-        namespace=namespace,
-        use_sim_time=use_sim_time,
-        warnings=warnings,
-        needs_values=needs_values,
-    )
+    result = load_system(path, text, arguments, **options)
     if result.scenario is not None:
         raise CommandError(
             f"'{text}' is a scenario, not a system",
