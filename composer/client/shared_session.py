@@ -5,23 +5,17 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
-from functools import wraps
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from rclpy.subscription import Subscription
 
 from composer.base.fast_dataclass import dataclass
 from composer.client.messages.values import class_of
 from composer.client.session import Deadline, Session
 from composer.model.qos import QosProfile
-from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.sources import Taken
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.ros_graph.changes import GraphChanges
 
@@ -37,10 +31,9 @@ _AFTER_FAILURE_S = 0.1
 class SharedSession(Session):
     """A session with threads of its own: any number of threads may wait at the same time.
 
-    An executor of rclpy serves clients. It takes most of a millisecond for each event, so messages
-    do without: those of :meth:`subscribe` are passed on by a loop of the composer, and those of
-    :meth:`sample` are taken by the caller; what arrives in between costs no Python at all.
-    ``changes`` counts the changes of the graph.
+    An executor of rclpy serves clients and subscriptions. It takes most of a millisecond for each
+    event, so frequent messages do without: those of :meth:`sample` are taken by the caller, and
+    what arrives in between costs no Python at all. ``changes`` counts the changes of the graph.
     """
 
     def __init__(self) -> None:
@@ -49,16 +42,14 @@ class SharedSession(Session):
         self.changes = GraphChanges(self.node)
         self._handled = threading.Condition()
         self._is_open = True
-        self._messages = Node(
-            f"{self.node.get_name()}_messages",
+        self._samples = Node(
+            f"{self.node.get_name()}_samples",
             context=self._context,
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
-        self._loop = Loop("messages", _log_exception)
-        self._loop.start()
         self._thread = threading.Thread(target=self._spin, name="ros session", daemon=True)
         self._thread.start()
 
@@ -66,8 +57,7 @@ class SharedSession(Session):
         self._is_open = False
         self._executor.shutdown(_JOIN_S)  # ends the wait, which a mere wake-up does not
         self._thread.join(_JOIN_S)
-        self._loop.stop(_JOIN_S)
-        self._messages.destroy_node()
+        self._samples.destroy_node()
         super().__exit__(*exception)
 
     def spin_once(self, deadline: Deadline) -> None:
@@ -75,38 +65,11 @@ class SharedSession(Session):
         with self._handled:
             self._handled.wait(min(_WAIT_S, deadline.left_s))
 
-    def subscribe(
-        self,
-        message_type: type[Any],
-        topic: str,
-        callback: Callable[[Any], None],
-        qos: QoSProfile,
-        *,
-        raw: bool = False,
-    ) -> Subscription:
-        """Call ``callback(message)`` on the thread of the loop; see :meth:`Session.subscribe`."""
-
-        @wraps(callback)  # for its name
-        def on_message(taken: Taken) -> None:
-            callback(taken[0])
-            self._notify()
-
-        subscription = self._messages.create_subscription(
-            message_type, topic, _ignore, qos, raw=raw
-        )
-        self._loop.add_subscription(subscription, on_message)
-        return subscription
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """Destroy a subscription of :meth:`subscribe`."""
-        self._loop.remove(subscription)
-        self._messages.destroy_subscription(subscription)
-
     def sample(
         self, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
     ) -> SampledTopic:
         """Subscribe to a topic. Raises InvalidValueError if the type is not installed."""
-        return SampledTopic(self._messages, topic, type_name, qos, raw=raw)
+        return SampledTopic(self._samples, topic, type_name, qos, raw=raw)
 
     def _spin(self) -> None:
         while self._is_open:
@@ -119,12 +82,8 @@ class SharedSession(Session):
                     return
                 logging.getLogger(__name__).exception("a callback of the session failed")
                 time.sleep(_AFTER_FAILURE_S)
-            self._notify()
-
-    def _notify(self) -> None:
-        """Wake up the threads that wait for what was just handled."""
-        with self._handled:
-            self._handled.notify_all()
+            with self._handled:
+                self._handled.notify_all()
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,10 +139,6 @@ class SampledTopic:
     def close(self) -> None:
         """Destroy the subscription."""
         self._node.destroy_subscription(self._subscription)
-
-
-def _log_exception(what: str, error: BaseException) -> None:
-    logging.getLogger(__name__).error("%s of the session failed", what, exc_info=error)
 
 
 def _ignore(_: Any) -> None:

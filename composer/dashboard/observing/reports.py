@@ -31,7 +31,7 @@ class SystemReports:
         self._on_report = on_report
         self._systems: Systems | None = None
         self._discovered: tuple[str, ...] = ()
-        self._change = 0
+        self._change = -1
         self._users = 0
         self._callback_users = 0
         self._with_callbacks = False

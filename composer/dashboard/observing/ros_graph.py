@@ -79,7 +79,7 @@ class RosGraph:
         self._names: object = None
         self._names_due_s = 0.0
         self._endpoints_due_s = 0.0
-        self._change = 0
+        self._change = -1
         self._certain_s = 0.0
         self._joined_s = time.monotonic()
 
