@@ -15,7 +15,6 @@ import typer
 from composer.cli.support.errors import CommandError
 from composer.cli.support.options import quantity
 from composer.cli.support.terminal import say
-from composer.runtime.process.watchdog import STOP_SIGNALS
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
@@ -86,6 +85,7 @@ def bag_errors() -> Iterator[None]:
     temporary files are deleted.
     """
     from composer.bags.bag import BagError, require
+    from composer.runtime.process.watchdog import STOP_SIGNALS
 
     signals = [item for item in STOP_SIGNALS if signal.getsignal(item) is signal.SIG_DFL]
     for number in signals:
