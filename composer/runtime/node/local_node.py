@@ -119,7 +119,7 @@ class LocalNode(ManagedNode):
         self.loop.add_node(self._ros)
         for service in self._ros.services:
             answer = rclpy_callback(service, self.loop.run_task)
-            options.router.offer(service, self.loop.call_soon, answer)
+            self._context.router.offer(service, self.loop.call_soon, answer)
         self.lifecycle = Lifecycle(
             self._context_of_transitions(),
             self,
