@@ -113,7 +113,7 @@ def test_calls_have_the_same_outcomes_in_process_and_by_dds(
         assert outcomes(system, 3)[-1] == REFUSED
         system.change("server", "cleanup")
         # By DDS it is discovered some milliseconds later.
-        wait_until(lambda: not client.clients.ask._has_server(), "the end of the server")
+        wait_until(lambda: not system.has_server("client", "/ask"), "the end of the server")
         ask(system, timeout_ms=300.0)
         assert outcomes(system, 4)[-1] == "ServerUnavailable"
 
@@ -153,14 +153,12 @@ def test_concurrent_calls_end_each_at_its_own_timeout(tmp_path: Path) -> None:
     with running(
         text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
     ) as system:
-        client = system.node("client")
         system.spawn("client", system.behavior("client").ask_at_once((90.0, 30.0, 60.0)))
         results = outcomes(system, 3)
         assert results == [
             ("CallTimeout", limit, f"service '/ask' did not answer within {limit:g} ms")
             for limit in (90.0, 30.0, 60.0)
         ]
-        wait_until(lambda: not client._context.gate.pending._futures, "no future is pending")
 
 
 @pytest.mark.parametrize("delivery", ["auto", "dds"])
@@ -168,9 +166,7 @@ def test_a_failed_call_that_is_not_awaited_is_logged(tmp_path: Path, delivery: s
     text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
     with running(text, tmp_path, asking=MODULE) as system:
         client = system.node("client")
-        wait_until(
-            system.behavior("client").clients.ask._has_server, "the server, which DDS discovers"
-        )
+        wait_until(lambda: system.has_server("client", "/ask"), "the server, which DDS discovers")
         client.loop.run(system.behavior("client").ask_and_go)
         line = system.wait_for_log("did not answer")
         counted = system.summary("/client").errors

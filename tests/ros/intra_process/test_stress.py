@@ -242,8 +242,8 @@ class Stress:
 
     def _is_alone(self) -> bool:
         """Return whether the publishers match only the three in-process subscriptions."""
-        ports = [self._system.publisher(name, "stream") for name in WRITERS]
-        return all(port._publisher.get_subscription_count() == 3 for port in ports)
+        publishers = [self._system.publisher(name, "stream") for name in WRITERS]
+        return all(publisher.get_subscription_count() == 3 for publisher in publishers)
 
     def _sent_by(self, name: str) -> dict[int, int]:
         """Stop a node that writes; return the last message of each of its writers."""

@@ -44,11 +44,11 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
 
     The middleware counts a match before it reports it.
     """
-    port = system.publisher("source", "numbers")
-    publisher = port.gated
+    of_rclpy = system.publisher("source", "numbers")
+    publisher = system.sender("source", "numbers")
 
     def is_counted() -> bool:
-        matched = port._publisher.get_subscription_count()
+        matched = of_rclpy.get_subscription_count()
         has_external = matched > len(publisher._subscriptions)
         is_current = publisher._generation is match_flag.MATCHING.generation
         will_check = not match_flag.MATCH_FLAG[0] or not is_current
@@ -102,7 +102,7 @@ def test_every_external_subscription_is_noticed(
     apart = NUMBERS.replace("KIND", "events").replace("executors:", "namespace: /apart\nexecutors:")
     options = HostOptions(log_level=LogLevel(level))
     with running(apart, tmp_path, options=options, counting=MODULE) as system:
-        publisher = system.publisher("source", "numbers")._publisher
+        publisher = system.publisher("source", "numbers")
         count = system.ros_node("source").count_subscribers
         for turn in range(5):
             send(system, 10)

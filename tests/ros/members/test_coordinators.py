@@ -204,7 +204,7 @@ def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
         (tmp_path / "robot.yaml").write_text(TEXT, encoding="utf-8")
         options = HostOptions(stop_within_s=6.0, member_command=command_of(tmp_path / "robot.yaml"))
         system = RunningSystem(system_of(TEXT, tmp_path, detector=DETECTOR), options, None)
-        wait_until(lambda: len(system.host._node_set.nodes) == 3, "the nodes")
+        wait_until(lambda: len(system.host.nodes) == 3, "the nodes")
         wait_until(lambda: system.node("detector").pid, "the start of the other process")
         assert system.node("camera").pid is None
     try:

@@ -87,7 +87,7 @@ def test_up_in_order_data_flows_and_down(
         known = [(node.host, node.pid) for node in system.report().nodes]
         host = socket.gethostname()
         others = [(host, str(pid)) for pid in pids]
-        assert known == [*others, ("", str(os.getpid()))]
+        assert known == [*others, (host, str(os.getpid()))]
 
         # The nodes have their own services; what other tools do with them is followed.
         state = peer.call(GetState, "/lab/detector/get_state").current_state.label

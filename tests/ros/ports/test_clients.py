@@ -33,8 +33,7 @@ def declared(on_failure: bool) -> str:
 
 def activate_once_the_server_is_known(system: RunningSystem) -> None:
     """Wait for the server: discovery may take longer than the timeout of the call."""
-    client = system.node("asker")._entities.clients["trigger"]
-    wait_until(client._has_server, "the server")
+    wait_until(lambda: system.has_server("asker", "/trigger"), "the server")
     system.change("asker", "activate")
 
 
@@ -125,8 +124,7 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
     with running(CALLER.replace("KIND", kind), tmp_path, caller=MODULE) as system:
         system.wait_for_log("asking")
         system.wait_for_log("resting")
-        context = system.node("caller")._context
-        wait_until(lambda: len(context.gate.pending._futures) == 2, "both wait")
+        context, _ = system.node("caller").contexts
         assert peer.change("/caller", "deactivate")
         assert peer.state("/caller") == "inactive"
         wait_until(lambda: not context.tasks, "no task is running")

@@ -6,7 +6,7 @@ import itertools
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Coroutine, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -119,16 +119,24 @@ def test_no_external_transition_is_undone(
     assert len(moved) == count, "the supervisor has moved a node"
 
 
-def test_a_node_that_was_shut_down_meanwhile_does_not_fail(tmp_path: Path) -> None:
+def test_a_node_that_was_shut_down_meanwhile_does_not_fail(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As by the coordinating process of the system, when it also ends this one."""
     text = "{system: robot, nodes: {arm: {}}}"
     with running(text, tmp_path, autostart=PrimaryState.UNCONFIGURED) as system:
-        node, is_free = system.node("arm"), threading.Event()
+        node, is_free, is_requested = system.node("arm"), threading.Event(), threading.Event()
+        run_task = node.loop.run_task
+
+        def noted(work: Coroutine[Any, Any, Any]) -> Any:
+            is_requested.set()
+            return run_task(work)
+
         node.loop.call_soon(is_free.wait)
         change = node.loop.run_task(node.lifecycle.change("shutdown"))
-        tasks = len(node.loop._tasks)
+        monkeypatch.setattr(node.loop, "run_task", noted)
         system.host.stop("the test is over")
-        wait_until(lambda: len(node.loop._tasks) > tasks, "the step of the tear-down")
+        wait_until(is_requested.is_set, "the step of the tear-down")
         is_free.set()
         assert system.end().exit_code == 0
         assert change.result().success

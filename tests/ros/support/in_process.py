@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
 from typing import Any, TypeVar
@@ -21,12 +22,15 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from composer.base.diagnostics import has_errors
+from composer.client.systems.local_queries import local_report
 from composer.language.document import parse_bytes
 from composer.language.expand import expand
-from composer.model import PrimaryState, System
+from composer.model import Node as DeclaredNode
+from composer.model import Port, PrimaryState, System
 from composer.model.resolve import resolve
 from composer.plan import bring_up, tear_down
 from composer.project import Project
@@ -99,6 +103,22 @@ def system_of(text: str, folder: Path, **modules: str) -> System:
     return system
 
 
+class _Behaviors:
+    """The behaviors of a system, by the keys of their nodes; changes nothing of it."""
+
+    def __init__(self) -> None:
+        self.latest: dict[str, Any] = {}
+
+    def receiver(self, _: Port, receiver: T) -> T:
+        return receiver
+
+    def behavior(self, node: DeclaredNode, behavior: object) -> None:
+        self.latest[node.name.value] = behavior
+
+    def timer(self, _node: str, _timer: str, tick: Callable[[], None]) -> Callable[[], None]:
+        return tick
+
+
 class RunningSystem:
     """A host on a thread of this process, and the events that it reported."""
 
@@ -107,6 +127,9 @@ class RunningSystem:
     ) -> None:
         self.events: list[Event] = []
         up = bring_up(system, autostart)
+        self._name = system.name.value
+        self._behaviors = _Behaviors()
+        options = replace(options, instruments=self._behaviors)
         self.host = Host(system, up, tear_down(system), options, self.events.append)
         self._outcome: Future[Outcome] = Future()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -136,37 +159,32 @@ class RunningSystem:
 
     def node(self, name: str) -> RunningNode:
         """Return a node of the system by its key."""
-        return self.host._node_set.nodes[name]
+        node: Any = self.host.nodes[name]
+        return node  # type: ignore[no-any-return]
 
     def behavior(self, name: str) -> Any:
-        """Return the behavior of a node, which exists from configure to cleanup."""
-        return self.node(name)._behavior
+        """Return the behavior of a node since it was last configured."""
+        return self._behaviors.latest[name]
 
     def ros_node(self, name: str) -> Node:
         """Return the node of rclpy that a node of the system has."""
-        return self.node(name)._context.node
+        return self.node(name).contexts[0].node
 
     def spawn(self, name: str, work: Coroutine[Any, Any, object]) -> None:
         """Run a coroutine as one of a behavior's."""
-        self.node(name)._context.spawn(work)
+        self.node(name).contexts[0].spawn(work)
 
     def sender(self, node: str, publisher: str) -> Any:
         """Return a publisher as a behavior has it."""
-        return self.node(node)._entities.senders[publisher]
+        return self.behavior(node).publishers[publisher]
 
     def report(self) -> SystemReport:
         """Return what the system reports about itself."""
-        return self.host._status.snapshot()
+        return wait_until(lambda: local_report(self._name, PATIENCE_S), "the report")
 
     def chains(self) -> tuple[ChainFigures, ...]:
         """Return how long data has taken on the chains."""
-        return self.host._node_set.chains()
-
-    def port(self, node: str, name: str) -> Any:
-        """Return a port of a configured node."""
-        return next(
-            port for port in self.node(node)._entities.ports if getattr(port, "_name", None) == name
-        )
+        return self.host.chains()
 
     def change(self, node: str, *transitions: str) -> None:
         """Run transitions of a node, one after the other."""
@@ -178,14 +196,22 @@ class RunningSystem:
             wait_until(future.done, f"{node} {goal}")
             assert running_node.state == goal
 
-    def publisher(self, node: str, name: str) -> Any:
-        """Return the port of a publisher."""
-        return self.node(node)._entities.publishers[name]
+    def publisher(self, node: str, name: str) -> Publisher:
+        """Return the publisher of rclpy that a port has."""
+        port = self.node(node).model.port(name)
+        assert port is not None
+        found = (end for end in self.ros_node(node).publishers if end.topic_name == port.full_name)
+        return next(found)
 
     def wait_for_listener(self, node: str, publisher: str) -> None:
         """Wait until a publisher has an external subscription; earlier messages are lost."""
-        port = self.publisher(node, publisher)
-        wait_until(port._publisher.get_subscription_count, f"a subscription of {publisher}")
+        of_rclpy = self.publisher(node, publisher)
+        wait_until(of_rclpy.get_subscription_count, f"a subscription of {publisher}")
+
+    def has_server(self, node: str, service: str) -> bool:
+        """Return whether the client of a node has discovered the server of a service."""
+        clients = self.ros_node(node).clients
+        return any(end.srv_name == service and end.service_is_ready() for end in clients)
 
     def log(self) -> list[str]:
         return [event.message for event in self.reported(Logged)]

@@ -32,12 +32,13 @@ class Tracker(Behavior):
     timeout_ms = 20000
 
     def on_configure(self):
-        self.found, self.errors = [], []
+        self.asked, self.found, self.errors = [], [], []
 
     async def on_activate(self):
         self.available = self.transforms.can_lookup("map", "laser")
 
     async def on_target(self, message):
+        self.asked.append(message)
         try:
             header, timeout_ms = message.header, self.timeout_ms
             found = await self.transforms.wait(
@@ -108,7 +109,7 @@ def test_a_behavior_looks_up_what_other_nodes_broadcast(tmp_path: Path, peer: Pe
 
         # The transform for a message arrives after it, as it usually does.
         target.publish(asked("laser", 11.5))
-        wait_until(lambda: tracker.transforms._buffer._waiting, "the behavior to wait")
+        wait_until(lambda: tracker.asked, "the behavior to wait")
         for stamp_s, x in ((10.0, 1.0), (11.0, 2.0), (12.0, 4.0)):
             moved = transform("map", "base_link", stamp_s, x)
             dynamic.publish(TFMessage(transforms=[moved]))

@@ -97,6 +97,14 @@ def start(children: ChildProcesses, script: str, lines: list[tuple[str, bool]]) 
     )
 
 
+def kill_launcher(child: Child) -> int:
+    """Kill the process that starts the children, the parent of a child; return its id."""
+    stat = Path("/proc", str(child.pid), "stat").read_text(encoding="utf-8")
+    pid = int(stat.rpartition(")")[2].split()[1])
+    os.kill(pid, signal.SIGKILL)
+    return pid
+
+
 def test_output_and_status(children: ChildProcesses) -> None:
     lines: list[tuple[str, bool]] = []
     child = start(children, "echo out; echo error >&2; exit 3", lines)
@@ -195,9 +203,7 @@ def test_nothing_survives_the_launcher(children: ChildProcesses) -> None:
     lines: list[tuple[str, bool]] = []
     child = start(children, "(setsid sleep 60 & echo $!); exec sleep 60", lines)
     wait_until(lambda: lines and child.started.done(), "the number of the daemon")
-    process = children._launcher
-    assert process is not None
-    process.kill()
+    kill_launcher(child)
     wait_until(child.ended.done, "the end")
     entries = [Path("/proc", pid) for pid in (str(child.pid), lines[0][0])]
     wait_until(lambda: not any(entry.exists() for entry in entries), "the death of both")
@@ -215,12 +221,10 @@ def test_a_launcher_that_was_killed_is_closed_without_an_error(children: ChildPr
         printed.set()
         closing.wait(PATIENCE_S)  # keeps the thread from noticing anything
 
-    children.start(Command(["sh", "-c", "echo ready; exec sleep 60"]), on_line)
+    child = children.start(Command(["sh", "-c", "echo ready; exec sleep 60"]), on_line)
     assert printed.wait(PATIENCE_S)
-    process = children._launcher
-    assert process is not None
-    process.kill()
-    process.wait(PATIENCE_S)
+    wait_until(child.started.done, "the id of the child")
+    os.waitid(os.P_PID, kill_launcher(child), os.WEXITED | os.WNOWAIT)
     closer = threading.Thread(target=lambda: errors.append(closed(children)))
     errors: list[BaseException | None] = []
     closer.start()
