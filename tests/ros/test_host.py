@@ -12,7 +12,6 @@ from std_srvs.srv import Trigger
 from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import (
     BroughtUp,
-    NodeFailed,
     NodeTransitionFailed,
     RollingBack,
     Stopping,
@@ -247,21 +246,6 @@ def test_a_refused_deactivation_is_reported_and_followed_by_shutdown(tmp_path: P
     refused = system.reported(NodeTransitionFailed)[0]
     assert (refused.state, refused.reason) == ("active", "TransitionFailed: not now")
     assert [node.state for node in outcome.nodes] == ["finalized"] * 3
-
-
-def test_a_failure_in_an_external_transition_is_reported(tmp_path: Path, peer: Peer) -> None:
-    module = """
-    from composer.behavior import Behavior
-
-    class Planner(Behavior):
-        def on_deactivate(self):
-            raise ValueError("broken")
-    """
-    with running(CHAIN, tmp_path, planner=module) as system:
-        assert not peer.change("/planning/planner", "deactivate")
-        assert peer.state("/planning/planner") == "unconfigured"
-        wait_until(lambda: system.reported(NodeFailed), "the failure, before the stop")
-        assert system.stop().exit_code == 1
 
 
 def test_a_fault_that_was_not_handled_before_the_stop_counts(tmp_path: Path, peer: Peer) -> None:

@@ -33,9 +33,3 @@ def test_a_file_with_errors_or_of_a_node_type_is_rejected(
     done = compose(*command.split(), "nodes/relay.yaml")
     assert (done.code, done.out) == (code, "")
     assert "'nodes/relay.yaml' is a node type, not a system" in done.err
-
-
-def test_an_unknown_system_is_a_usage_error_with_a_suggestion() -> None:
-    done = compose("diff", "pipelin")
-    assert (done.code, done.out) == (2, "")
-    assert "did you mean 'pipeline'?" in done.err

@@ -41,16 +41,6 @@ def test_a_file_without_problems_prints_nothing_to_stdout(folder: Path) -> None:
     assert (done.code, done.out, done.err) == (0, "", "1 file checked: no problems found\n")
 
 
-def test_a_diagnostic_has_a_location_a_caret_and_a_hint(folder: Path) -> None:
-    Path("broken.yaml").write_text(BROKEN)
-    done = compose("validate", "fine.yaml", "broken.yaml")
-    assert done.code == 1
-    assert "broken.yaml:3:36" in done.out
-    assert "^^^^^" in done.out
-    assert "did you mean 'second'?" in done.out
-    assert done.err == "2 files checked\n"
-
-
 @pytest.mark.parametrize("paths", [[], ["."]])
 def test_a_folder_is_searched_for_systems_and_node_types_only(
     folder: Path, paths: list[str]

@@ -5,9 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import signal
-import socket
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from textwrap import dedent
 
@@ -52,23 +50,9 @@ def loud(tmp_path: Path) -> Path:
     return path
 
 
-def pipe() -> tuple[int, int]:
+def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(loud: Path, peer: Peer) -> None:
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
-    return reading, writing
-
-
-def sockets() -> tuple[int, int]:
-    reading, writing = socket.socketpair()
-    writing.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-    return reading.detach(), writing.detach()
-
-
-@pytest.mark.parametrize("connect", [pipe, sockets])
-def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(
-    loud: Path, peer: Peer, connect: Callable[[], tuple[int, int]]
-) -> None:
-    reading, writing = connect()
     process = subprocess.Popen([*COMPOSE, "run", str(loud)], stdout=writing, stderr=writing)
     os.close(writing)
     try:

@@ -32,10 +32,8 @@ def requests(process: subprocess.Popen[str]) -> Counter[str]:
 @pytest.mark.parametrize(
     ("command", "expected", "services"),
     [
-        ("lifecycle get forgetful", "unconfigured\n", ["get_state"]),
         ("lifecycle list forgetful", "configure\n", ["get_available_transitions"]),
         ("lifecycle nodes", "/lab/forgetful  unconfigured\n", ["get_state"]),
-        ("param list", "/lab/forgetful:\n  speed\n", ["list_parameters"]),
         ("param get forgetful speed", "1.5\n", ["list_parameters", "get_parameters"]),
         (
             "param describe forgetful speed",

@@ -52,8 +52,3 @@ def test_types_that_other_nodes_do_not_use() -> None:
         (f"other nodes use type {number}, not {truth}\n", *publish, truth, "--once"),
         (f"other nodes use type {switch}, not {trigger}\n", *call, trigger),
     )
-
-
-def test_a_mistyped_field() -> None:
-    wrong = ("topic", "pub", "/lab/in", "std_msgs/msg/String", "{dta: hello}", *AT_ONCE)
-    assert "did you mean 'data'?" in error(*wrong)

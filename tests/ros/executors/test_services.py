@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from rcl_interfaces.srv import GetLoggerLevels
 from std_srvs.srv import Trigger
 
 from composer.runtime.executors.futures import wrap_future
@@ -136,11 +135,6 @@ def test_an_exception_in_a_done_callback_is_reported(on: Bench) -> None:
 
 
 class TestServicesOfEveryNode:
-    def test_logger_levels_can_be_read(self, on: Bench) -> None:
-        client = on.client(GetLoggerLevels, "bench/get_logger_levels")
-        answer = call(on, client, GetLoggerLevels.Request(names=["bench"]))
-        assert [level.name for level in answer.levels] == ["bench"]
-
     @pytest.mark.parametrize("kind", ["plain", "async"])
     def test_a_service_that_was_not_added_uses_its_own_callback(self, on: Bench, kind: str) -> None:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

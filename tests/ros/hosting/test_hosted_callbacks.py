@@ -15,7 +15,7 @@ CLASSES = "tests.ros.support.callback_classes"
 OTHERS = "tests.ros.support.node_classes"
 
 
-@pytest.mark.parametrize("executor", [None, "events", "multi_threaded"])
+@pytest.mark.parametrize("executor", [None, "multi_threaded"])
 def test_a_callback_may_block_until_another_node_responds(
     tmp_path: Path, executor: str | None
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -20,7 +19,6 @@ from composer.plan.drift import ObservedNode
 from composer.runtime.protocol.requests import CallNodes, NodeCall
 from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
 from composer.runtime.ros.messages import to_plain
-from tests.ros.support.commands import listed, output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 LEAN = """
@@ -191,16 +189,3 @@ def test_a_node_with_all_endpoints_has_those_of_a_lifecycle_node(
         wait_until(lambda: endpoints("whole") == expected, "all endpoints")
     finally:
         plain.destroy_node()
-
-
-def test_commands_work_the_same_with_such_nodes(system: RunningSystem) -> None:
-    patiently = ("--timeout", "20")
-    text = output_of("lifecycle", "set", "talker", "deactivate", *patiently)
-    assert text == f"{TALKER}: active -> inactive\n"
-    (reported,) = json.loads(listed((TALKER,), "ps", "--json"))["systems"]
-    states = {node["node"]: node["state"] for node in reported["nodes"]}
-    assert states == {TALKER: "inactive", "/whole": "active"}
-    output_of("lifecycle", "set", "talker", "--to", "active", *patiently)
-    assert listed(("3.5",), "param", "set", "talker", "speed", "3.5")
-    listed(("3.5",), "param", "get", "talker", "speed")
-    assert system.node("talker").state == "active"

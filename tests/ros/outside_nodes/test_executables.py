@@ -257,8 +257,15 @@ ENDS_PROPERLY = (
 )
 
 
-@pytest.mark.parametrize("signal_number", [signal.SIGTERM, signal.SIGKILL, None])
-@pytest.mark.parametrize("policy", ["shutdown", "isolate"])
+@pytest.mark.parametrize(
+    ("signal_number", "policy"),
+    [
+        (signal.SIGTERM, "shutdown"),
+        (signal.SIGKILL, "shutdown"),
+        (signal.SIGKILL, "isolate"),
+        (None, "isolate"),
+    ],
+)
 def test_the_end_of_a_program_and_the_exit_code(
     signal_number: signal.Signals | None, policy: str, tmp_path: Path
 ) -> None:

@@ -12,12 +12,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int64, String
 
-from composer.model import ExecutorKind
 from tests.ros.support.commands import output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-KINDS = [str(kind) for kind in ExecutorKind]
+KINDS = ["events", "multi_threaded"]
 
 
 def counts(system: RunningSystem, node: str) -> dict[str, int]:

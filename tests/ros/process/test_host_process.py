@@ -88,29 +88,11 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
     assert "on_tick" in run.output
 
 
-@pytest.mark.parametrize(
-    ("variables", "words"),
-    [
-        ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1', which is not a domain id"),
-        (
-            {
-                "ROS_SECURITY_ENABLE": "true",
-                "ROS_SECURITY_KEYSTORE": "keys",
-                "ROS_SECURITY_STRATEGY": "Enforce",
-            },
-            "ROS does not start",
-        ),
-        ({"RMW_IMPLEMENTATION": "rmw_nonsense"}, "installed: rmw_fastrtps_cpp"),
-    ],
-)
-def test_an_invalid_environment_is_refused(
-    variables: dict[str, str], words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name, value in variables.items():
-        monkeypatch.setenv(name, value)
+def test_an_invalid_environment_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
     with compose_run("systems/minimal.yaml", "--for", "1") as run:
         assert run.wait() == 1
-    assert words in run.output
+    assert "ROS_DOMAIN_ID is '-1', which is not a domain id" in run.output
     assert "Traceback" not in run.output
     assert "internal error" not in run.output
 
@@ -160,14 +142,13 @@ nodes:
 """
 
 
-@pytest.mark.parametrize("level", ["info", "debug"])
-def test_node_logs_reach_the_terminal_at_their_level(level: str, tmp_path: Path) -> None:
+def test_node_logs_reach_the_terminal_at_their_level(tmp_path: Path) -> None:
     path = tmp_path / "loud.yaml"
     path.write_text(LOUD, encoding="utf-8")
-    with compose_run(path, "--for", "0.1", "--log-level", level) as run:
+    with compose_run(path, "--for", "0.1", "--log-level", "debug") as run:
         assert run.wait() == 0
     assert "] [WARN] [robot.loud] a warning\n" in run.output
-    assert ("] [DEBUG] [robot.loud] a debug line\n" in run.output) is (level == "debug")
+    assert "] [DEBUG] [robot.loud] a debug line\n" in run.output
 
 
 TURNER = """

@@ -190,21 +190,6 @@ def test_a_failed_node_is_isolated_and_the_others_continue(
         assert system.stop().exit_code == 0
 
 
-def test_an_isolated_node_makes_the_exit_code_1(tmp_path: Path, peer: Peer) -> None:
-    with running(robot("silent", "isolate"), tmp_path, sensor=SENSOR) as system:
-        assert peer.set_parameter("/sensor", "fault", "silent") == ""
-        wait_until(lambda: peer.state("/motor") == "inactive")
-        assert system.stop().exit_code == 1
-
-
-def test_a_failing_node_can_end_the_system(tmp_path: Path, peer: Peer) -> None:
-    with running(robot("silent", "shutdown"), tmp_path, sensor=SENSOR) as system:
-        assert peer.set_parameter("/sensor", "fault", "silent") == ""
-        outcome = system.end()
-    assert (outcome.exit_code, outcome.reason) == (1, "/sensor failed: silent for 300 ms")
-    assert [node.state for node in outcome.nodes] == ["finalized"] * 4
-
-
 def test_an_executor_that_cannot_be_interrupted_is_abandoned_until_it_returns(
     tmp_path: Path, peer: Peer
 ) -> None:

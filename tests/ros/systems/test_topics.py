@@ -86,24 +86,3 @@ def test_an_inline_node_uses_a_behavior_from_the_folder_of_node_types(tmp_path: 
     )
     with RunningSystem(str(system)) as running:
         running.wait_for(r"hello.*good day")
-
-
-def test_a_callback_over_its_budget_is_logged(tmp_path: Path) -> None:
-    system = tmp_path / "slow.yaml"
-    system.write_text(
-        "system: slow\n"
-        "nodes:\n"
-        "  slow: {behavior: 'slow:Slow', timers: {tick: {period_ms: 50, budget_ms: 5}}}\n"
-        "  quick: {timers: {tick: {period_ms: 500, budget_ms: 400, log: ticked}}}\n",
-        "utf-8",
-    )
-    (tmp_path / "slow.py").write_text(
-        "class Slow:\n    def on_tick(self):\n        sum(range(2_000_000))\n", "utf-8"
-    )
-    with RunningSystem(str(system)) as running:
-        line = running.wait_for(r"over its budget")
-        assert re.search(
-            r"\[WARN\] \[slow\] timer 'tick' took .* ms, over its budget of 5 ms", line
-        )
-        running.wait_for(r"\[quick\] ticked")
-        assert not [line for line in running.lines if "[quick] timer" in line]

@@ -11,23 +11,7 @@ from composer.base.characters import width
 from composer.base.diagnostics import Label, Severity
 from composer.base.source import SourceFile, Span
 from composer.report.text import render, summary
-from tests.unit.support.reporting import diagnostic, rule, span_of
-
-PLAIN = """\
-error[RC202 made-up]: it is wrong
- --> systems/demo.yaml:1:7
-  |
-1 | nodes: {talker: 1}
-  |       ^
-  = hint: fix it
-
-found 1 error
-"""
-
-
-def test_a_diagnostic_shows_its_line_with_a_caret() -> None:
-    found = diagnostic("nodes: {talker: 1}", " ", hint="fix it")
-    assert render([found]) == PLAIN
+from tests.unit.support.reporting import diagnostic, rule
 
 
 @pytest.mark.parametrize(
@@ -70,32 +54,6 @@ def marked_cells(report: str) -> int:
 def test_a_span_after_the_end_of_the_text_is_shown() -> None:
     found = replace(diagnostic("a", "a"), primary=Span(SourceFile("empty.yaml", ""), 1, 1, 1))
     assert render([found]).splitlines()[1:5] == [" --> empty.yaml:1:1", "  |", "1 |", "  | ^"]
-
-
-def test_labels_are_shown_on_lines_of_their_own() -> None:
-    source = SourceFile("systems/demo.yaml", "one: 1\ntwo: 2\n")
-    other = SourceFile("nodes/planner.yaml", "\n" * 11 + "three: 3")
-    found = replace(
-        diagnostic("one: 1\ntwo: 2\n", "one"),
-        related=(
-            Label(span_of(source, "1"), "this value"),
-            Label(span_of(other, "three", 12), "declared here"),
-        ),
-    )
-    assert render([found]) == (
-        "error[RC202 made-up]: it is wrong\n"
-        "  --> systems/demo.yaml:1:1\n"
-        "   |\n"
-        " 1 | one: 1\n"
-        "   | ^^^\n"
-        "   |      - this value\n"
-        "  ::: nodes/planner.yaml:12:1\n"
-        "   |\n"
-        "12 | three: 3\n"
-        "   | ----- declared here\n"
-        "\n"
-        "found 1 error\n"
-    )
 
 
 def test_messages_hints_paths_and_labels_are_escaped() -> None:

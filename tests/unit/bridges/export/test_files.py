@@ -40,11 +40,3 @@ def test_on_stdout_the_path_is_absolute(folder: Path) -> None:
     done = compose("export", "launch", "robot")
     assert done.code == 0, done.err
     assert f"SYSTEM = Path({str(folder / 'systems' / 'robot.yaml')!r})\n" in done.out
-
-
-def test_a_system_with_errors_is_not_exported(folder: Path) -> None:
-    (folder / "systems" / "robot.yaml").write_text("system: robot\nnodes: {a: {type: nothing}}\n")
-    done = compose("export", "launch", "robot", "-o", "robot.launch.py")
-    assert done.code == 1
-    assert "unknown-node-type" in done.err
-    assert not (folder / "robot.launch.py").exists()
