@@ -12,7 +12,7 @@ from composer.interfaces import Interfaces
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.copies import Copy, edited_copy
 from composer.python_code.checker.file_sets import FileSet
-from composer.python_code.checker.findings import MISSING_RETURN, SYNTAX_KINDS, Reader
+from composer.python_code.checker.findings import SYNTAX_KINDS, Reader
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding, Process, start_process
 from composer.python_code.checker.relevance import Relevance, reassigned
@@ -96,11 +96,7 @@ class Check:
         by_path: dict[str, list[tuple[Finding, Span]]] = {}
         for finding in findings:
             copy = self._copies.get(finding.path)
-            # A missing 'return' is reported at the type of the result, which may be inserted.
-            if copy is not None and (
-                finding.message.endswith(MISSING_RETURN)
-                or not copy.is_inserted(finding.line, finding.column)
-            ):
+            if copy is not None and finding.line not in copy.added:
                 by_path.setdefault(finding.path, []).append((finding, _span(finding, copy)))
         for path, in_file in by_path.items():
             self._unread += ((path, span) for _, span in in_file[MAX_FINDINGS : MAX_FINDINGS + 1])
@@ -126,9 +122,7 @@ class Check:
 def _span(finding: Finding, copy: Copy) -> Span:
     """Return the place of a finding in the original file."""
     source = copy.module.source
-    line, column = copy.place(finding.line, finding.column)
-    end_line, end = copy.place(finding.end_line, finding.end_column)
+    line, column = copy.line(finding.line), finding.column
     text = source.line(line)
-    if end_line != line:
-        end = len(text) + 1
+    end = finding.end_column if finding.end_line == finding.line else len(text) + 1
     return Span(source, line, min(column, len(text) + 1), max(end - column, 1))

@@ -1,7 +1,8 @@
 """Copies of Python files in which classes know their surroundings.
 
-In a copy, a behavior derives from the generated base class of its node type, and arguments of
-handlers and of rclpy callbacks without an annotation get one. Places in it are mapped back.
+In a copy, a behavior derives from the generated base class of its node type, and handlers and
+callbacks of rclpy know the types of their arguments. All that is added to a copy has lines of its
+own, so the columns of what a user wrote stay as they are.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.checker.file_sets import ClassEdit
 from composer.python_code.nodes import Signature
 from composer.python_code.stubs.messages import interface_modules
-from composer.python_code.syntax import Module
+from composer.python_code.syntax import Method, Module
 from composer.python_code.trees import (
     Function,
     characters,
@@ -37,32 +38,20 @@ _IMPORTS = (
 
 @dataclass(slots=True)
 class Copy:
-    """The text of a copy, and how its lines and columns relate to those of the original file."""
+    """The text of a copy, and which of its lines the original file does not have."""
 
     module: Module
     text: str
-    inserted_lines: tuple[int, ...]  # of the copy, in order
-    columns: Mapping[int, list[tuple[int, int]]]  # of original lines: column, length
+    added: frozenset[int]
 
-    def is_inserted(self, line: int, column: int) -> bool:
-        """Return whether the original lacks what is at a place of the copy."""
-        places = self.columns.get(self._original_line(line), ())
-        is_inside = any(start <= column < start + length for start, length in places)
-        return line in self.inserted_lines or is_inside
-
-    def _original_line(self, line: int) -> int:
-        return max(line - sum(inserted <= line for inserted in self.inserted_lines), 1)
-
-    def place(self, line: int, column: int) -> tuple[int, int]:
-        """Return the line and column in the original, counted from 1."""
-        line = self._original_line(line)
-        shift = sum(length for start, length in self.columns.get(line, ()) if start <= column)
-        return line, max(column - shift, 1)
+    def line(self, number: int) -> int:
+        """Return the line of the original that is at a line of the copy."""
+        return max(number - sum(added <= number for added in self.added), 1)
 
 
 def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool) -> Copy:
     """Return the copy of a file. ``classes`` are its classes with a known surrounding."""
-    edits = _Edits(list(module.source.text.split("\n")))
+    edits = _Edits(module.source.text.split("\n"))
     edits.import_interfaces(module.tree)
     names: set[str] = set()
     for class_ in module.classes.values():
@@ -77,26 +66,27 @@ def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior
         for method in class_.methods:
             signature = signatures.get(method.name)
             if signature is not None and method.node is not None:
-                edits.annotate(method.node, signature)
+                edits.annotate(method, method.node, signature)
                 types = [signature.result, *(type_ for _, type_ in signature.arguments)]
                 names.update(interface_modules(" ".join(types)))
-    imports = ", ".join((_IMPORTS, *sorted(names)))
-    edits.added.append((_lines_of_head(module.tree), imports))
-    lines, columns = edits.apply()
-    inserted = []
-    for number, (after, text) in enumerate(sorted(edits.added)):
-        lines.insert(after + number, text)
-        inserted.append(after + number + 1)
-    return Copy(module, "\n".join(lines), tuple(inserted), columns)
+    edits.added.append((_lines_of_head(module.tree), ", ".join((_IMPORTS, *sorted(names)))))
+    return edits.copy(module)
 
 
 @dataclass(slots=True)
 class _Edits:
-    """Texts to insert, by line and column: lines from 1, columns from 0, in characters."""
+    """The lines of a copy, and the lines to add after a number of lines."""
 
     lines: list[str]
-    insertions: list[tuple[int, int, str]] = field(default_factory=list)
-    added: list[tuple[int, str]] = field(default_factory=list)  # lines, after a number of lines
+    added: list[tuple[int, str]] = field(default_factory=list)
+
+    def copy(self, module: Module) -> Copy:
+        """Return the copy with all lines."""
+        numbers = set()
+        for count, (after, text) in enumerate(sorted(self.added)):
+            self.lines.insert(after + count, text)
+            numbers.add(after + count + 1)
+        return Copy(module, "\n".join(self.lines), frozenset(numbers))
 
     def import_interfaces(self, tree: ast.Module) -> None:
         """Import interfaces from modules that have stubs: see ``public_module``."""
@@ -126,59 +116,46 @@ class _Edits:
             method = f"{indentation}def _composer_unset(self, none: None): {statements}"
             self.added.append((node.end_lineno or node.lineno, method))
 
-    def apply(self) -> tuple[list[str], Mapping[int, list[tuple[int, int]]]]:
-        """Return the changed lines, and for each line what was inserted where in the result."""
-        columns: dict[int, list[tuple[int, int]]] = {}
-        lines = list(self.lines)
-        shifts: dict[int, int] = {}
-        for line, column, text in sorted(self.insertions):
-            at = column + shifts.get(line, 0)
-            old = lines[line - 1]
-            lines[line - 1] = old[:at] + text + old[at:]
-            columns.setdefault(line, []).append((at + 1, len(text)))
-            shifts[line] = shifts.get(line, 0) + len(text)
-        return lines, columns
-
     def add_base(self, node: ast.ClassDef, base: str) -> None:
-        """Add the first base class of a class."""
+        """Add the first base class of a class; its other bases follow in a line of their own."""
         line = self.lines[node.lineno - 1]
         named = re.search(rf"\bclass\s+{node.name}\b\s*(?:\[.*?\]\s*)?(\()?", line)
-        if named is not None:
-            comma = ", " if node.bases or node.keywords else ""
-            text = f"{base}{comma}" if named[1] else f"({base})"
-            self.insertions.append((node.lineno, named.end(), text))
+        if named is not None and named[1]:
+            self.added.append((node.lineno - 1, f"{line[: named.end()]}{base},"))
+            self.lines[node.lineno - 1] = " " * named.end() + line[named.end() :]
+        elif named is not None:
+            self.lines[node.lineno - 1] = f"{line[: named.end()]}({base}){line[named.end() :]}"
 
-    def annotate(self, function: Function, signature: Signature) -> None:
-        """Annotate the arguments of a method, and its result."""
-        arguments = positional_arguments(function)
-        if not any(_is_static(decorator) for decorator in function.decorator_list):
-            arguments = arguments[1:]
-        without_default = len(arguments) - len(function.args.defaults)
-        assigned = _assigned_names(function)
-        pairs = zip(arguments, signature.arguments, strict=False)
-        for index, (argument, (_, type_)) in enumerate(pairs):
-            # An argument that the method assigns itself may get a value of another type.
-            end = argument.end_lineno or argument.lineno, argument.end_col_offset or 0
-            if argument.annotation is not None:
-                self._insert(*end, _type_arguments(argument.annotation, type_))
-            elif type_ and argument.arg not in assigned and index < without_default:
-                self._insert(*end, f": {type_}")
-        if signature.result in ("", "None"):
-            return
+    def annotate(self, method: Method, node: Function, signature: Signature) -> None:
+        """Give the arguments of a method their types where its body begins, and its result."""
+        first = node.body[0]
+        number = min(x.lineno for x in (first, *getattr(first, "decorator_list", ())))
+        before, line = self.lines[number - 2], self.lines[number - 1]
+        indentation = line[: first.col_offset]
+        if indentation.strip() or before.endswith("\\"):
+            return  # the body is in the line of the signature
+        given = [item for item in positional_arguments(node) if item.arg in method.arguments]
+        pairs = zip(given, signature.arguments, strict=False)
+        known = [
+            f"{item.arg} = typing.cast({type_!r}, {item.arg})"
+            for item, (_, type_) in pairs
+            if type_ and (item.annotation is None or _is_generic(item.annotation, type_))
+        ]
+        if known:
+            self.added.append((number - 1, indentation + "; ".join(known)))
+        if signature.result not in ("", "None"):
+            self._annotate_result(node, signature.result)
+
+    def _annotate_result(self, function: Function, result: str) -> None:
         place = _end_of_signature(function, self.lines)
         if function.returns is None and place is not None:
-            self.insertions.append((*place, f" -> {signature.result}"))
+            number, column = place
+            line = self.lines[number - 1]
+            self.lines[number - 1] = f"{line[:column]} -> {result}{line[column:]}"
         elif function.returns is not None and is_none(function.returns):  # by habit
             number, line = function.returns.lineno, self.lines[function.returns.lineno - 1]
             start = characters(line, function.returns.col_offset)
-            self.lines[number - 1] = f"{line[:start]}    {line[start + 4 :]}"
-            self.insertions.append((number, start, signature.result))
-
-    def _insert(self, line: int, size_bytes: int, text: str) -> None:
-        if not text:
-            return
-        column = characters(self.lines[line - 1], size_bytes)
-        self.insertions.append((line, column, text))
+            self.lines[number - 1] = f"{line[:start]}{result}{line[start + 4 :]}"
 
 
 def _constructor(node: ast.ClassDef) -> list[ast.stmt]:
@@ -203,23 +180,10 @@ def _is_unset(statement: ast.stmt, attributes: Container[str]) -> TypeGuard[ast.
     return False
 
 
-def _type_arguments(annotation: ast.expr, type_: str) -> str:
-    """Return what an annotation such as ``ServerGoalHandle`` lacks: the types in brackets."""
-    name, bracket, rest = type_.partition("[")
-    is_same = dotted(annotation).rpartition(".")[2] == name.rpartition(".")[2]
-    return f"{bracket}{rest}" if is_same else ""
-
-
-def _is_static(decorator: ast.expr) -> bool:
-    return isinstance(decorator, ast.Name) and decorator.id == "staticmethod"
-
-
-def _assigned_names(function: Function) -> frozenset[str]:
-    return frozenset(
-        node.id
-        for node in ast.walk(function)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    )
+def _is_generic(annotation: ast.expr, type_: str) -> bool:
+    """Return whether an annotation such as ``ServerGoalHandle`` lacks the types in brackets."""
+    name, bracket, _ = type_.partition("[")
+    return bool(bracket) and dotted(annotation).rpartition(".")[2] == name.rpartition(".")[2]
 
 
 def _end_of_signature(function: Function, lines: list[str]) -> tuple[int, int] | None:

@@ -360,7 +360,8 @@ def _plain(text: str) -> str:
     """Return a type as a reader knows it."""
     literals = re.sub(_LITERAL, lambda found: found[1].replace("'", '"'), text)
     text = re.sub(_MODULE, "", literals).replace("ReturnType", "Return")
-    return text.replace("Float | Scalar", "float").replace("Values[", "list[")
+    text = text.replace("Float | Scalar", "float").replace("Values[", "list[")
+    return text.replace(": Unknown", "")
 
 
 def _may_be_none(given: str, expected: str) -> bool:
