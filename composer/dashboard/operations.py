@@ -192,12 +192,14 @@ def command(values: Values, _: Dashboard) -> Prepared:
 
 def _completed(ros: RosGraph, outcomes: Iterable[NodeOutcome]) -> list[dict[str, Any]]:
     """Return all changes. Raises RequestError for the first that failed, after the others."""
+    from composer.client.session import RosError
+
     found = list(outcomes)
-    changes = [outcome.result for outcome in found if outcome.result is not None]
+    changes = [outcome for outcome in found if not isinstance(outcome, RosError)]
     ros.learn_states({change.node: change.after for change in changes})
     for outcome in found:
-        if outcome.error is not None:
-            raise from_ros(outcome.error)
+        if isinstance(outcome, RosError):
+            raise from_ros(outcome)
     return [asdict(change) for change in changes]
 
 

@@ -163,21 +163,19 @@ def set_state(
     """
     targets, transition = _split(list(words or ()), to)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
-        from composer.client.systems.lifecycle_batch import (
-            LifecycleBatch,
-            LifecycleRequest,
-        )
+        from composer.client.session import RosError
+        from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         request = LifecycleRequest(transition, None if to is None else to.value)
         batch = LifecycleBatch(session, deadline, targets, request)
         _check_dependents(batch, dependents=dependents)
         failed = False
         for outcome in batch.run(dependents=dependents):
-            if outcome.error is None:
-                write(lines([str(outcome.result)]))
-            else:
+            if isinstance(outcome, RosError):
                 failed = True
-                say(CommandError(str(outcome.error), hint=outcome.error.hint).text())
+                say(CommandError(str(outcome), hint=outcome.hint).text())
+            else:
+                write(lines([str(outcome)]))
     if failed:
         raise typer.Exit(FAILED)
 

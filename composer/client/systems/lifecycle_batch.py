@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.client.lifecycle import CompletedTransition, LifecycleClient
@@ -33,12 +34,8 @@ class LifecycleRequest:
         return wanted.goal if wanted is not None and state in wanted.ids else None
 
 
-@dataclass(frozen=True, slots=True)
-class NodeOutcome:
-    """The result of a request for one node, or the error."""
-
-    result: CompletedTransition | None
-    error: RosError | None
+#: The result of a request for one node, or the error.
+NodeOutcome: TypeAlias = CompletedTransition | RosError
 
 
 class LifecycleBatch:
@@ -78,17 +75,17 @@ class LifecycleBatch:
         With ``dependents``, active dependents are deactivated before it, and inactive ones that can
         be active after it are activated, unless there was an error.
         """
-        failed = False
-        for node in self.active_dependents if dependents else ():
-            outcome = _outcome(partial(self._client.follow_to_state, node, "inactive"))
-            failed = failed or outcome.error is not None
-            yield outcome
-        for node in self._nodes:
-            outcome = _outcome(partial(self._change, node))
-            failed = failed or outcome.error is not None
+        client, failed = self._client, False
+        changes = [partial(self._change, node) for node in self._nodes]
+        if dependents:
+            before = self.active_dependents
+            changes[:0] = (partial(client.follow_to_state, node, "inactive") for node in before)
+        for change in changes:
+            outcome = _outcome(change)
+            failed = failed or isinstance(outcome, RosError)
             yield outcome
         for node in self._inactive_dependents if dependents and not failed else ():
-            yield _outcome(partial(self._client.follow_to_state, node, "active"))
+            yield _outcome(partial(client.follow_to_state, node, "active"))
 
     def _goals(self, nodes: Iterable[NodeReport]) -> dict[str, str]:
         """Return the states to which the request takes nodes of a system from other ones."""
@@ -107,9 +104,9 @@ class LifecycleBatch:
 
 def _outcome(change: Callable[[], CompletedTransition]) -> NodeOutcome:
     try:
-        return NodeOutcome(change(), None)
+        return change()
     except RosError as error:
-        return NodeOutcome(None, error)
+        return error
 
 
 def _system_reports(session: Session, deadline: Deadline) -> dict[str, SystemReport | None]:
