@@ -59,7 +59,7 @@ class GraphRecording:
     def close(self) -> None:
         """Destroy the subscriptions."""
         for subscription, _ in self._subscriptions.values():
-            self._session.unsubscribe(subscription)
+            self._session.node.destroy_subscription(subscription)
         self._subscriptions.clear()
 
     def _subscribe(self, info: TopicInfo, types: tuple[str, ...]) -> None:
@@ -68,7 +68,7 @@ class GraphRecording:
         if current is not None:
             if not any(incompatibilities(offer, current[1]) for offer in offers):
                 return
-            self._session.unsubscribe(current[0])
+            self._session.node.destroy_subscription(current[0])
         if len(types) != 1:
             self._refuse(info.name, f"it has several types: {', '.join(types)}")
             return
@@ -83,7 +83,7 @@ class GraphRecording:
         topic = BagTopic(info.name, types[0], offers, definition, type_hash=type_hash)
         put = self._recorder.source(topic).put
         profile = strictest_compatible(list(offers), _DEPTH)
-        subscription = self._session.subscribe(
+        subscription = self._session.node.create_subscription(
             message_class, info.name, partial(put), rclpy_profile(profile), raw=True
         )
         self._subscriptions[info.name] = (subscription, profile)

@@ -31,7 +31,7 @@ class GraphNames:
         Nodes have no types. A name that two nodes share is listed twice.
         """
         found = self._settled(lambda: self._graph.names(kind))
-        if kind == "topic" and not self._session.others():
+        if kind == "topic" and not self._session.graph.others():
             return ()  # they belong to this session
         return found if hidden else visible_names(found)
 

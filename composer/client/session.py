@@ -17,8 +17,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.middleware import dds_profiles
@@ -134,26 +132,6 @@ class Session:
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    def subscribe(
-        self,
-        message_type: type[Any],
-        topic: str,
-        callback: Callable[[Any], None],
-        qos: QoSProfile,
-        *,
-        raw: bool = False,
-    ) -> Subscription:
-        """Call ``callback(message)`` for each message; with ``raw``, for its serialized bytes."""
-        return self.node.create_subscription(message_type, topic, callback, qos, raw=raw)
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """Destroy a subscription of :meth:`subscribe`."""
-        self.node.destroy_subscription(subscription)
-
-    def others(self) -> tuple[NodeName, ...]:
-        """Return name and namespace of every known node except those of commands."""
-        return self.graph.others()
-
     def is_local_discovered(self) -> bool:
         """Return whether all nodes of this computer are discovered."""
         count = len(self.graph.participants())
@@ -164,7 +142,7 @@ class Session:
 
         Their processes are stopped or busy, so their nodes are not known.
         """
-        known = set(self.others())
+        known = set(self.graph.others())
         return {name: pid for name, pid in local_systems().items() if (NAME, name) not in known}
 
     def spin_once(self, deadline: Deadline) -> None:
@@ -222,7 +200,7 @@ class Session:
 
     def _discovered(self) -> tuple[int, tuple[NodeName, ...]]:
         """Return the number of known participants, including this one, and the nodes."""
-        return len(self.graph.participants()), self.others()
+        return len(self.graph.participants()), self.graph.others()
 
 
 class _LastChange:

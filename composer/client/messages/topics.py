@@ -70,7 +70,7 @@ class TopicSubscription:
         self._session = session
         self._type_name = type_name
         self._received: deque[Received] = deque()
-        self._subscription = session.subscribe(
+        self._subscription = session.node.create_subscription(
             class_of(type_name),
             topic,
             lambda content: self._received.append(Received(content, time.monotonic())),
@@ -82,7 +82,7 @@ class TopicSubscription:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._session.unsubscribe(self._subscription)
+        self._session.node.destroy_subscription(self._subscription)
 
     def no_message_error(self, timeout_s: float) -> NoResponseError:
         """Return the error for a topic without messages, with the reason if it is known."""

@@ -170,7 +170,7 @@ class Systems:
         """Destroy the subscriptions to systems that have ended."""
         for name in names:
             for subscription in self._subscriptions.pop(name, ()):
-                self._session.unsubscribe(subscription)
+                self._session.node.destroy_subscription(subscription)
             for reports in (self._states, self._other_versions, self._callbacks, self._arrivals_s):
                 reports.pop(name, None)
 
@@ -320,7 +320,7 @@ class Systems:
             if self._on_report is not None and is_state:
                 self._on_report()
 
-        return self._session.subscribe(String, full_topic, on_message, qos)
+        return self._session.node.create_subscription(String, full_topic, on_message, qos)
 
 
 class _ProcessDeadline(Deadline):

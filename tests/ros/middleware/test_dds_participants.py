@@ -41,7 +41,7 @@ took_s, missing = [], []
 for _ in range({JOINS}):
     with Session() as session:
         began_s = time.monotonic()
-        session.wait_for(lambda: session.others() or None, Deadline(10.0))
+        session.wait_for(lambda: session.graph.others() or None, Deadline(10.0))
         took_s.append(time.monotonic() - began_s)
         found = dict(GraphNames(session, Deadline(10.0)).names("topic"))
         missing.append(sum(topic not in found for topic in {TOPICS}))
@@ -57,12 +57,12 @@ from composer.client.session import Deadline, Session, use_command_profile
 
 use_command_profile()
 with Session() as session:
-    session.wait_for(lambda: session.others() or None, Deadline(10.0))
+    session.wait_for(lambda: session.graph.others() or None, Deadline(10.0))
     sockets = {os.readlink(path) for path in Path("/proc/self/fd").iterdir() if path.is_socket()}
     rows = [row.split() for row in Path("/proc/net/udp").read_text().splitlines()[1:]]
     ports = [int(row[1].rpartition(":")[2], 16) for row in rows if f"socket:[{row[9]}]" in sockets]
     shared = re.findall("/dev/shm/fast.*", Path("/proc/self/maps").read_text())
-    print(json.dumps([session.others(), ports, shared]))
+    print(json.dumps([session.graph.others(), ports, shared]))
 """
 
 

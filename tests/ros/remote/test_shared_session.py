@@ -62,14 +62,14 @@ def test_a_subscription_gets_messages_in_order_until_it_ends(
 ) -> None:
     publisher = peer.node.create_publisher(String, "/text", QOS)
     received: list[str] = []
-    subscription = session.subscribe(
+    subscription = session.node.create_subscription(
         String, "/text", lambda message: received.append(message.data), QOS
     )
     wait_until(lambda: publisher.get_subscription_count() == 1, "the subscription")
     for text in TEXTS:
         publisher.publish(String(data=text))
     wait_until(lambda: len(received) == len(TEXTS), "the messages")
-    session.unsubscribe(subscription)
+    session.node.destroy_subscription(subscription)
     wait_until(lambda: publisher.get_subscription_count() == 0, "the end of the subscription")
     assert received == TEXTS
 
@@ -84,7 +84,7 @@ def test_a_callback_that_raises_is_logged_and_ends_nothing(
         received.append(message.data)
         raise ValueError("not this one")
 
-    session.subscribe(String, "/text", on_message, QOS)
+    session.node.create_subscription(String, "/text", on_message, QOS)
     wait_until(lambda: publisher.get_subscription_count() == 1, "the subscription")
     for text in TEXTS:
         publisher.publish(String(data=text))
