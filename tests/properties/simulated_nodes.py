@@ -107,6 +107,7 @@ class SimulatedNode:
 
     name = "default"  # of the loop
     transition_started_s = 0.0
+    has_finished = False
 
     def __init__(self, model: Node, world: World, listener: SupervisionListener) -> None:
         self.model = model
@@ -294,12 +295,6 @@ class World:
         return found
 
     def is_lost(self, _: str) -> bool:
-        return False
-
-    def is_absent(self, name: str) -> bool:
-        return self.nodes[name].is_absent
-
-    def has_finished(self, _: str) -> bool:
         return False
 
     def timeout_s(self, _: str) -> float:

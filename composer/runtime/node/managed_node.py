@@ -6,7 +6,7 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
@@ -172,6 +172,21 @@ class ManagedNode(ABC):
     def callback_owners(self) -> tuple[object, ...]:
         """The objects by which a running callback on a stack is recognized as the node's."""
         return ()
+
+    @property
+    def is_absent(self) -> bool:
+        """Whether it is not there, and something else has to start it."""
+        return False
+
+    @property
+    def has_finished(self) -> bool:
+        """Whether it is a program that has ended itself, with exit status 0."""
+        return False
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """What is known of a node outside the process, by fields of ``NodeReport``."""
+        return {}
 
     @abstractmethod
     def now_s(self) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Set
-from typing import Any
 
 from rclpy.node import Node as RosNode
 
@@ -98,16 +97,6 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
     def is_absent(self) -> bool:
         """Whether it is not there, and something else has to start it."""
         return self._is_lost
-
-    @property
-    def has_finished(self) -> bool:
-        """Whether it is a program that has ended itself, with exit status 0."""
-        return False
-
-    @property
-    def figures(self) -> Mapping[str, Any]:
-        """What is known of it, by the names of the fields of ``NodeReport``."""
-        return {}
 
     def now_s(self) -> float:
         """Return the system time in seconds."""

@@ -65,7 +65,7 @@ class FaultHandler:
         """Record what becomes of a failed node; None if there is nothing to do."""
         name = fault.node
         is_end = fault.kind in (FaultKind.ENDED, FaultKind.STEP)
-        if is_end and self._node_set.has_finished(name):
+        if is_end and self._node_set.nodes[name].has_finished:
             fault = replace(fault, kind=FaultKind.FINISHED)
         decision = decide(self._system, self._shared.value, fault, now_s)
         if decision is None or self._is_outdated(fault):
@@ -116,7 +116,7 @@ class FaultHandler:
         state = self._node_set.nodes[fault.node].state
         match fault.kind:
             case FaultKind.ABSENT:
-                return not self._node_set.is_absent(fault.node)
+                return not self._node_set.nodes[fault.node].is_absent
             case FaultKind.TRANSITION:
                 return state not in _DOWN
             case FaultKind.SILENCE | FaultKind.ERRORS:

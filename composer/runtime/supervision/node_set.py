@@ -21,7 +21,6 @@ from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameters import ParameterError
 from composer.runtime.outside_nodes.external_node import ExternalNode
-from composer.runtime.outside_nodes.outside_node import OutsideNode
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
@@ -150,8 +149,7 @@ class NodeSet:
 
     def reported_figures(self) -> Mapping[str, Mapping[str, Any]]:
         """Return what is known of the nodes outside the process, by fields of ``NodeReport``."""
-        nodes = tuple(self.nodes.items())
-        return {name: node.figures for name, node in nodes if isinstance(node, OutsideNode)}
+        return {name: node.figures for name, node in tuple(self.nodes.items())}
 
     def summaries(self) -> tuple[NodeSummary, ...]:
         """Return the states and the counters of all nodes."""
@@ -170,16 +168,6 @@ class NodeSet:
         return any(
             self.is_lost(name) and self.nodes[name].state != FINALIZED for name in self.nodes
         )
-
-    def is_absent(self, name: str) -> bool:
-        """Return whether the node is not there, and something else has to start it."""
-        node = self.nodes[name]
-        return isinstance(node, OutsideNode) and node.is_absent
-
-    def has_finished(self, name: str) -> bool:
-        """Return whether the node is a program that has ended itself, with exit status 0."""
-        node = self.nodes[name]
-        return isinstance(node, OutsideNode) and node.has_finished
 
     def running_callbacks(self, name: str) -> list[RunningCallback]:
         """Return the callbacks that keep the threads of the node's loop busy, one per thread."""

@@ -134,7 +134,7 @@ class Reconciler:
             if not failure.stuck:  # otherwise, it is reported already
                 self._report_failed_step(failure)
             return
-        kind = FaultKind.ABSENT if self.node_set.is_absent(name) else FaultKind.STEP
+        kind = FaultKind.ABSENT if self.node_set.nodes[name].is_absent else FaultKind.STEP
         fault = Fault(name, kind, failure.text, self.desired.serial)
         self.shared.update(partial(DesiredState.await_fault, fault=fault))
         self.main_queue.put(fault)
