@@ -258,7 +258,8 @@ class Host:
 
         Unless it is all or nothing, nodes that fail are restarted, as often as their policies say.
         """
-        steps_s = sum(self._node_set.timeout_s(step.node) for step in self._up.steps)
+        nodes = self._node_set.nodes
+        steps_s = sum(nodes[step.node].transition_timeout_s for step in self._up.steps)
         once_s = steps_s if self._options.all_or_nothing else math.inf
         return min(once_s, self._options.bring_up_within_s) + steps_s
 

@@ -107,6 +107,7 @@ class SimulatedNode:
 
     name = "default"  # of the loop
     transition_started_s = 0.0
+    transition_timeout_s = 10.0
     has_finished = False
 
     def __init__(self, model: Node, world: World, listener: SupervisionListener) -> None:
@@ -296,9 +297,6 @@ class World:
 
     def is_lost(self, _: str) -> bool:
         return False
-
-    def timeout_s(self, _: str) -> float:
-        return 10.0
 
     def recreate(self, name: str, is_outdated: Callable[[], bool]) -> str | None:
         self.interleave()

@@ -162,14 +162,7 @@ class HealthMonitor:
         for name, node in nodes.items():
             if node is owner:
                 observed.node = name
-                observed.limit_s = self._limit_s(observed.callback, name, node)
-
-    def _limit_s(self, callback: RunningCallback, name: str, node: ManagedNode) -> float:
-        """Return the time limit of a callback; handlers of transitions have one of their own."""
-        if callback.in_transition:
-            return self._node_set.timeout_s(name) + _TRANSITION_MARGIN_S
-        limit = node.model.supervision.watch.callback_ms
-        return math.inf if limit is None else limit.value / 1000.0
+                observed.limit_s = _limit_s(observed.callback, node)
 
     def _check_limit(self, observed: _ObservedCallback, node: str, now_s: float) -> None:
         callback = observed.callback
@@ -214,6 +207,14 @@ class HealthMonitor:
             ]
             if max(ages_s, default=0.0) < _RECOVERED_WITHIN_S:
                 self._report(LoopRecovered(loop))
+
+
+def _limit_s(callback: RunningCallback, node: ManagedNode) -> float:
+    """Return the time limit of a callback; handlers of transitions have one of their own."""
+    if callback.in_transition:
+        return node.transition_timeout_s + _TRANSITION_MARGIN_S
+    limit = node.model.supervision.watch.callback_ms
+    return math.inf if limit is None else limit.value / 1000.0
 
 
 #: A node and how often it had become active.

@@ -101,10 +101,6 @@ class NodeSet:
         if has_classes and not self._clock.is_virtual:
             self._turn_watch.start()
 
-    def timeout_s(self, name: str) -> float:
-        """Return the time limit of a node's transitions."""
-        return self.nodes[name].transition_timeout_s
-
     def states(self) -> Mapping[str, PrimaryState]:
         """Return the states of the nodes that can be moved, by their keys.
 

@@ -139,7 +139,7 @@ class PlanExecutor:
         ):
             phase.finish(step, is_reached=False)
             return
-        limit_s = min(self._node_set.timeout_s(step.node) + _STUCK_AFTER_S, options.step_limit_s)
+        limit_s = min(node.transition_timeout_s + _STUCK_AFTER_S, options.step_limit_s)
         is_outdated = partial(self._is_outdated, step, options)
         others = tuple(other.full_name for other in after)
         future = self._node_set.run_step(step.node, step.transition, is_outdated, others)
