@@ -96,7 +96,7 @@ class VirtualClock(Clock):
 
     def time_ns(self) -> int:
         """Return the nanoseconds since 1970, as if the system had started at ``start_ns``."""
-        return self._start_ns + round(self._now_s * _NANOSECONDS)
+        return self._start_ns + round(self.monotonic() * _NANOSECONDS)
 
     def sleep(self, delay_s: float, /) -> None:
         """Block the calling thread for ``delay_s`` seconds of virtual time."""

@@ -237,6 +237,19 @@ def test_what_a_class_cannot_do_is_reported(
         assert at_s == pytest.approx(expected_s)
 
 
+@pytest.mark.parametrize("is_ros", ["true", "false"])
+def test_a_class_that_waits_busily_ends_the_run(tmp_path: Path, is_ros: str) -> None:
+    path = tmp_path / "busily.yaml"
+    node = f'{{class: "{TIMED}:WaitsBusily", arguments: {{is_ros: {is_ros}}}}}'
+    path.write_text(f"system: s\nnodes: {{busily: {node}}}\n")
+    with SystemTest(path) as system:
+        system.advance(10.0)
+    assert system.outcome is not None
+    assert system.outcome.exit_code == 1
+    reason = f"a callback goes on without waiting at {TIMED_FILE}:"
+    assert f"the time does not advance, because {reason}" in system.outcome.reason
+
+
 @pytest.mark.parametrize("in_callback", ["true", "false"])
 def test_a_class_that_waits_for_a_lock_ends_the_run(
     tmp_path: Path, in_callback: str, monkeypatch: pytest.MonkeyPatch

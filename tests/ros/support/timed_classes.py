@@ -135,6 +135,23 @@ class WaitsForever(Node):
             self.get_logger().info("waiting")
 
 
+class WaitsBusily(Node):
+    """Reads a clock until some time has passed, without a sleep."""
+
+    def __init__(self, is_ros: bool) -> None:
+        super().__init__("busily")
+        self.is_ros = is_ros
+        self.create_timer(1.0, self.tick)
+
+    def now_s(self) -> float:
+        return self.get_clock().now().nanoseconds / 1e9 if self.is_ros else time.time()
+
+    def tick(self) -> None:
+        end_s = self.now_s() + 100.0
+        while self.now_s() < end_s:
+            pass
+
+
 class Locked(Node):
     """Waits for a lock in its constructor or in a callback, and nothing releases the lock."""
 
