@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import replace
+from heapq import heappop, heappush
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mcap.exceptions import UnsupportedCompressionError
+import zstandard
+from lz4.frame import LZ4FrameDecompressor
+from mcap.exceptions import McapError, UnsupportedCompressionError
 from mcap.reader import SeekingReader
 from mcap.records import Attachment as AttachmentRecord
 from mcap.records import Channel, Chunk, ChunkIndex, Message, Schema, Statistics
@@ -34,11 +38,14 @@ from composer.base.regular_files import open_regular
 _LONGEST_RECORD_BYTES = 2**30
 #: A few kilobytes of zstd can stand for gigabytes. Writers make chunks of one to four megabytes.
 _LARGEST_CHUNK_BYTES = 2**28
+#: Chunks that overlap in time are in memory together.
+_LARGEST_OVERLAP_BYTES = 2**30
 _COMPRESSIONS = ("", "zstd", "lz4")
+_TIME = attrgetter("recorded_ns")
 
 
-class _TooLargeChunk(Exception):
-    """A chunk that would take much memory; the text says how much."""
+class _TooLarge(Exception):
+    """Something that would take much memory; the text says how much."""
 
 
 @dataclass(slots=True)
@@ -75,7 +82,8 @@ class McapBag:
             with reading(file.path), open_regular(file.path) as stream:
                 if not file.has_index:
                     found = _scanned(stream, topics)
-                    yield from (item for item in found if start_ns <= item.recorded_ns < end_ns)
+                    inside = (item for item in found if start_ns <= item.recorded_ns < end_ns)
+                    yield from inside if file.problem else sorted(inside, key=_TIME)
                 else:
                     yield from _indexed(stream, topics, start_ns, end_ns)
 
@@ -98,11 +106,13 @@ def _open_mcap(path: Path) -> _McapFile:
         problem = ""  # an index is optional
         stream.seek(0)
         try:
-            found = SeekingReader(stream, record_size_limit=_LONGEST_RECORD_BYTES).get_summary()
+            found = _reader(stream).get_summary()
             if found is not None and found.statistics is not None:
-                _check_chunks(found.chunk_indexes)
-                return _McapFile(path, _summary(found, found.statistics))
-        except (UnsupportedCompressionError, _TooLargeChunk):
+                for chunk in found.chunk_indexes:
+                    _check_chunk(chunk)
+                has_index = bool(found.chunk_indexes)
+                return _McapFile(path, _summary(found, found.statistics), has_index)
+        except (UnsupportedCompressionError, _TooLarge):
             raise
         except Exception:  # whatever the library raises for the wrong bytes
             problem = "its end is missing or damaged"
@@ -110,17 +120,33 @@ def _open_mcap(path: Path) -> _McapFile:
         return _McapFile(path, _scanned_summary(stream), has_index=False, problem=problem)
 
 
-def _check_chunks(chunks: Iterable[Chunk | ChunkIndex]) -> None:
-    """Raise UnsupportedCompressionError, or _TooLargeChunk.
+def _check_chunk(chunk: Chunk | ChunkIndex) -> None:
+    """Raise UnsupportedCompressionError, or _TooLarge.
 
     The library takes chunks with an unknown compression for uncompressed ones.
     """
-    for chunk in chunks:
-        if chunk.compression not in _COMPRESSIONS:
-            raise UnsupportedCompressionError(chunk.compression)
-        if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
-            size, most = chunk.uncompressed_size >> 20, _LARGEST_CHUNK_BYTES >> 20
-            raise _TooLargeChunk(f"it has a chunk of {size:,} MB, more than {most} MB")
+    if chunk.compression not in _COMPRESSIONS:
+        raise UnsupportedCompressionError(chunk.compression)
+    if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
+        size, most = chunk.uncompressed_size >> 20, _LARGEST_CHUNK_BYTES >> 20
+        raise _TooLarge(f"it has a chunk of {size:,} MB, more than {most} MB")
+
+
+def _records_in(chunk: Chunk) -> list[Any]:
+    """Return the records of a chunk, whose data may decompress to more than it declares.
+
+    The library decompresses all of the data.
+    """
+    _check_chunk(chunk)
+    data, size = chunk.data, chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        with zstandard.ZstdDecompressor().stream_reader(data) as source:
+            data = source.read(size + 1)
+    elif chunk.compression == "lz4":
+        data = LZ4FrameDecompressor().decompress(data, size + 1)
+    if len(data) != size:
+        raise McapError(f"a chunk has {len(data):,} bytes or more, not {size:,}")
+    return breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
 
 
 def _summary(found: McapSummary, statistics: Statistics) -> Summary:
@@ -149,15 +175,57 @@ def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
 def _indexed(
     stream: BinaryIO, topics: frozenset[str], start_ns: int, end_ns: int
 ) -> Iterator[BagMessage]:
-    reader = SeekingReader(stream, validate_crcs=True, record_size_limit=_LONGEST_RECORD_BYTES)
-    found = reader.iter_messages(topics, starting_at=start_ns, ending_before=end_ns)
-    for _, channel, message in found:
-        yield BagMessage(channel.topic, message.log_time, message.publish_time, message.data)
+    found = _reader(stream).get_summary()
+    channels = {} if found is None else found.channels
+    names = {item.id: item.topic for item in channels.values() if item.topic in topics}
+    waiting: list[tuple[int, int, int, Message]] = []  # by time, and place in the file
+    size = 0
+    for index in _chunks(found, names, start_ns, end_ns):
+        while waiting and waiting[0][0] < index.message_start_time:
+            message = heappop(waiting)[-1]
+            size -= len(message.data)
+            yield _message(names, message)
+        stream.seek(index.chunk_start_offset)
+        chunk = next(_records(stream, skip_magic=True))
+        if not isinstance(chunk, Chunk):
+            raise McapError("its index names a chunk where there is none")
+        for place, item in enumerate(_records_in(chunk)):
+            if not isinstance(item, Message) or item.channel_id not in names:
+                continue
+            if start_ns <= item.log_time < end_ns:
+                heappush(waiting, (item.log_time, index.chunk_start_offset, place, item))
+                size += len(item.data)
+        if size > _LARGEST_OVERLAP_BYTES:
+            raise _TooLarge(f"more than {_LARGEST_OVERLAP_BYTES >> 20:,} MB of it overlap in time")
+    yield from (_message(names, heappop(waiting)[-1]) for _ in range(len(waiting)))
 
 
-def _records(stream: BinaryIO) -> Iterator[Any]:
+def _chunks(
+    summary: McapSummary | None, channels: Container[int], start_ns: int, end_ns: int
+) -> list[ChunkIndex]:
+    """Return the chunks with messages of these channels and times, each once, in order."""
+    wanted: dict[int, ChunkIndex] = {}
+    for index in () if summary is None else summary.chunk_indexes:
+        has_times = index.message_start_time < end_ns and index.message_end_time >= start_ns
+        inside = index.message_index_offsets  # by channel; an index may leave them out
+        if has_times and (not inside or any(channel in channels for channel in inside)):
+            wanted[index.chunk_start_offset] = index
+    return sorted(wanted.values(), key=attrgetter("message_start_time", "chunk_start_offset"))
+
+
+def _message(names: Mapping[int, str], item: Message) -> BagMessage:
+    return BagMessage(names[item.channel_id], item.log_time, item.publish_time, item.data)
+
+
+def _reader(stream: BinaryIO) -> SeekingReader:
+    return SeekingReader(stream, record_size_limit=_LONGEST_RECORD_BYTES)
+
+
+def _records(stream: BinaryIO, *, skip_magic: bool = False) -> Iterator[Any]:
     """Yield the records of a file, and its chunks as such."""
-    reader = StreamReader(stream, emit_chunks=True, record_size_limit=_LONGEST_RECORD_BYTES)
+    reader = StreamReader(
+        stream, skip_magic, emit_chunks=True, record_size_limit=_LONGEST_RECORD_BYTES
+    )
     return reader.records
 
 
@@ -169,11 +237,8 @@ def _batches(stream: BinaryIO) -> Iterator[list[Any]]:
             record = next(records, None)
             if record is None:
                 return
-            batch = [record]
-            if isinstance(record, Chunk):
-                _check_chunks([record])
-                batch = breakup_chunk(record, validate_crc=True)
-        except (UnsupportedCompressionError, _TooLargeChunk):
+            batch = _records_in(record) if isinstance(record, Chunk) else [record]
+        except (UnsupportedCompressionError, _TooLarge):
             raise
         except Exception:  # whatever the library raises for the wrong bytes
             return

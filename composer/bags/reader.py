@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 from weakref import finalize
 
 from composer.bags.bag import Bag, BagError, reading, require
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 #: The suffix of a file that rosbag2 has compressed, with ``--compression-mode file``.
 _COMPRESSED = ".zstd"
+#: How many times larger than itself a compressed file may be. A few kilobytes could fill the disk.
+_MOST_TIMES = 1000
+_BLOCK_BYTES = 2**20
 
 
 def open_bag(path: Path) -> Bag:
@@ -44,7 +48,8 @@ def _decompressed(path: Path, files: tuple[Path, ...]) -> Bag:
         for file in files:
             plain.append(folder / file.stem)
             with reading(file), file.open("rb") as source, plain[-1].open("wb") as target:
-                zstandard.ZstdDecompressor().copy_stream(source, target)
+                blocks = zstandard.ZstdDecompressor().read_to_iter(source, write_size=_BLOCK_BYTES)
+                _write(blocks, target, file)
         bag = _open(path, tuple(plain))
     except BaseException:
         rmtree(folder, ignore_errors=True)
@@ -52,6 +57,15 @@ def _decompressed(path: Path, files: tuple[Path, ...]) -> Bag:
     bag.files = [str(file) for file in files]
     finalize(bag, rmtree, folder, ignore_errors=True)
     return bag
+
+
+def _write(blocks: Iterable[bytes], target: BinaryIO, file: Path) -> None:
+    """Write what ``file`` contains. Raises BagError if that is too much."""
+    size, most = 0, file.stat().st_size * _MOST_TIMES
+    for block in blocks:
+        size += target.write(block)
+        if size > most:
+            raise BagError(f"{file} contains more than {_MOST_TIMES:,} times its size")
 
 
 def _open(path: Path, files: tuple[Path, ...]) -> McapBag | SqliteBag:
