@@ -13,6 +13,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.model.qos import QosProfile
 
 NANOSECONDS = 1_000_000_000
+#: What Python needs for a message in memory, in addition to its data.
+_BYTES_PER_MESSAGE = 200
 #: How ROS 2 serializes messages.
 CDR = "cdr"
 
@@ -50,6 +52,11 @@ class BagMessage(NamedTuple):
     recorded_ns: int
     published_ns: int
     data: bytes
+
+    @property
+    def memory_bytes(self) -> int:
+        """What it takes in memory, about."""
+        return len(self.data) + _BYTES_PER_MESSAGE
 
 
 class Attachment(NamedTuple):

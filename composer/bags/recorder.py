@@ -183,8 +183,9 @@ class Recorder:
                         source.dropped += 1
                         continue
                     self._write()
-                self._pending.append(BagMessage(source.topic, at_ns, at_ns, bytes(data)))
-                self._serialized_bytes += len(data)
+                message = BagMessage(source.topic, at_ns, at_ns, bytes(data))
+                self._pending.append(message)
+                self._serialized_bytes += message.memory_bytes
 
     def _write(self) -> None:
         """Pass what is pending to the sink, until there is a problem."""
@@ -195,7 +196,7 @@ class Recorder:
                     if isinstance(item, BagTopic):
                         self._sink.add_topic(item)
                         continue
-                    self._written_bytes += len(item.data)
+                    self._written_bytes += item.memory_bytes
                     if self.problem is None:
                         self._sink.write(item)
                 if self.problem is None:

@@ -29,7 +29,7 @@ class Ring:
     def write(self, message: BagMessage) -> None:
         """Keep a message."""
         self._messages.append(message)
-        self._size_bytes += len(message.data)
+        self._size_bytes += message.memory_bytes
         oldest_ns = message.recorded_ns - self._length_ns
         while self._messages[0].recorded_ns < oldest_ns or self._size_bytes > _LARGEST_BYTES:
             self._discard()
@@ -58,7 +58,7 @@ class Ring:
 
     def _discard(self) -> None:
         message = self._messages.popleft()
-        self._size_bytes -= len(message.data)
+        self._size_bytes -= message.memory_bytes
         profiles = self._topics[message.topic].qos
         if any(item.durability is Durability.TRANSIENT_LOCAL for item in profiles):
             self._latched[message.topic] = message

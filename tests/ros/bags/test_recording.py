@@ -379,6 +379,20 @@ class _StalledDisk(_FullDisk):
         super().write(message)
 
 
+def test_small_messages_that_wait_for_a_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python needs far more memory for them than for their bytes."""
+    monkeypatch.setattr("composer.bags.recorder._LARGEST_PENDING_BYTES", 1_000_000)
+    sink = _StalledDisk()
+    recorder = Recorder(sink, COMPUTER)
+    source = recorder.source(BagTopic("/empty", "std_msgs/msg/Empty"))
+    with recorder:
+        for _ in range(9_000):
+            source.put(b"1234")
+        wait_until(lambda: recorder.dropped >= 3_000, "drops")
+        sink.goes_on.set()
+    assert len(sink.written) + recorder.dropped == 9_000
+
+
 def test_a_stalled_disk_delays_no_node_and_costs_limited_memory() -> None:
     sink = _StalledDisk()
     recorder = Recorder(sink, COMPUTER)
