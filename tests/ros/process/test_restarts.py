@@ -86,9 +86,10 @@ def children(pid: int) -> list[int]:
     """Return a process and all of its descendants."""
     pids = [pid]
     for parent in pids:  # grows
-        for task in Path(f"/proc/{parent}/task").iterdir():
-            with suppress(FileNotFoundError):  # the thread ends just now
-                pids += map(int, (task / "children").read_text(encoding="ascii").split())
+        with suppress(FileNotFoundError):  # the process ends just now
+            for task in Path(f"/proc/{parent}/task").iterdir():
+                with suppress(FileNotFoundError):  # the thread ends just now
+                    pids += map(int, (task / "children").read_text(encoding="ascii").split())
     return pids
 
 
