@@ -137,33 +137,27 @@ system: loud
 nodes:
   loud:
     namespace: robot
+    behavior: loud:Loud
     on_configure: {log: {level: debug, message: "a debug line"}}
     on_activate: {log: {level: warn, message: "a warning"}}
 """
-
-
-def test_node_logs_reach_the_terminal_at_their_level(tmp_path: Path) -> None:
-    path = tmp_path / "loud.yaml"
-    path.write_text(LOUD, encoding="utf-8")
-    with compose_run(path, "--for", "0.1", "--log-level", "debug") as run:
-        assert run.wait() == 0
-    assert "] [WARN] [robot.loud] a warning\n" in run.output
-    assert "] [DEBUG] [robot.loud] a debug line\n" in run.output
-
-
-TURNER = """
+LOUD_MODULE = """
 import sys
 
-class Turner:
+class Loud:
     def on_activate(self):
-        self.log.info(f"interval {sys.getswitchinterval():g}")
+        self.log.info(f"threads take turns after {sys.getswitchinterval():g} s")
 """
 
 
-def test_threads_take_turns_soon(tmp_path: Path) -> None:
-    path = tmp_path / "turns.yaml"
-    path.write_text("system: turns\nnodes: {turner: {behavior: 'turner:Turner'}}\n", "utf-8")
-    path.with_name("turner.py").write_text(TURNER, encoding="utf-8")
-    with compose_run(path, "--for", "0.1") as run:
+def test_node_logs_reach_the_terminal_at_their_level_and_threads_take_turns_soon(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "loud.yaml"
+    path.write_text(LOUD, encoding="utf-8")
+    path.with_suffix(".py").write_text(LOUD_MODULE, encoding="utf-8")
+    with RunningSystem(str(path), "--for", "0.1", "--log-level", "debug") as run:
         assert run.wait() == 0
-    assert "] interval 0.001\n" in run.output
+    assert "] [WARN] [robot.loud] a warning\n" in run.output
+    assert "] [DEBUG] [robot.loud] a debug line\n" in run.output
+    assert "] threads take turns after 0.001 s\n" in run.output
