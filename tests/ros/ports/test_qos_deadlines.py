@@ -12,11 +12,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.model import ExecutorKind
 from composer.runtime.ports import qos_events
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
-KINDS = [str(kind) for kind in ExecutorKind]
+KINDS = ["events", "multi_threaded"]
 
 
 def counts(system: RunningSystem, node: str) -> dict[str, int]:
