@@ -97,9 +97,9 @@ def start(children: ChildProcesses, script: str, lines: list[tuple[str, bool]]) 
     )
 
 
-def kill_launcher(child: Child) -> int:
+def kill_launcher_of(child: int) -> int:
     """Kill the process that starts the children, the parent of a child; return its id."""
-    stat = Path("/proc", str(child.pid), "stat").read_text(encoding="utf-8")
+    stat = Path("/proc", str(child), "stat").read_text(encoding="utf-8")
     pid = int(stat.rpartition(")")[2].split()[1])
     os.kill(pid, signal.SIGKILL)
     return pid
@@ -203,7 +203,7 @@ def test_nothing_survives_the_launcher(children: ChildProcesses) -> None:
     lines: list[tuple[str, bool]] = []
     child = start(children, "(setsid sleep 60 & echo $!); exec sleep 60", lines)
     wait_until(lambda: lines and child.started.done(), "the number of the daemon")
-    kill_launcher(child)
+    kill_launcher_of(child.started.result())
     wait_until(child.ended.done, "the end")
     entries = [Path("/proc", pid) for pid in (str(child.pid), lines[0][0])]
     wait_until(lambda: not any(entry.exists() for entry in entries), "the death of both")
@@ -216,15 +216,16 @@ def test_nothing_survives_the_launcher(children: ChildProcesses) -> None:
 def test_a_launcher_that_was_killed_is_closed_without_an_error(children: ChildProcesses) -> None:
     """Its end may not have been noticed yet."""
     printed, closing = threading.Event(), threading.Event()
+    pids: list[int] = []
 
-    def on_line(*_: object) -> None:
+    def on_line(text: str, _: bool) -> None:
+        pids.append(int(text))
         printed.set()
         closing.wait(PATIENCE_S)  # keeps the thread from noticing anything
 
-    child = children.start(Command(["sh", "-c", "echo ready; exec sleep 60"]), on_line)
+    children.start(Command(["sh", "-c", "echo $$; exec sleep 60"]), on_line)
     assert printed.wait(PATIENCE_S)
-    wait_until(child.started.done, "the id of the child")
-    os.waitid(os.P_PID, kill_launcher(child), os.WEXITED | os.WNOWAIT)
+    os.waitid(os.P_PID, kill_launcher_of(pids[0]), os.WEXITED | os.WNOWAIT)
     closer = threading.Thread(target=lambda: errors.append(closed(children)))
     errors: list[BaseException | None] = []
     closer.start()
