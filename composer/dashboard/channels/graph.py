@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -35,15 +35,15 @@ _SHOWN = (
 _SOON_S = 0.1
 
 
-class DiagramFeed(Feed):
-    """Lays out the diagram whenever the graph has changed, on a worker thread.
-
-    By itself it sends nothing: it prepares the diagram for a page that is being loaded.
-    """
+class PictureFeed(Feed):
+    """The diagram on a page, laid out on a worker thread whenever the graph has changed."""
 
     follows_reports = True  # to wake up together with the other feeds
 
     def __init__(self, values: Values, declared: Declared | None) -> None:
+        width = values.number("width", _WIDTH, _MIN_SIDE, _MAX_SIDE)
+        height = values.number("height", _HEIGHT, _MIN_SIDE, _MAX_SIDE)
+        self._page = (width, height)
         self._view = values.choice("view", VIEWS, "nodes")
         self._is_live = self._view not in _DECLARED_ONLY
         self._declared = None if self._is_live else required(declared, f"the view {self._view}")
@@ -78,10 +78,12 @@ class DiagramFeed(Feed):
         ros.work(lambda: self._draw(topology, states))
 
     def _draw(self, topology: Topology, states: Mapping[str, str | None]) -> None:
+        from composer.graph.layout import Size
+
         key = (self._drawn, self._view, self._is_live)
         try:
             diagram = self.ros.diagrams.of(key, lambda: self._laid_out(topology, states))
-            self._finished.extend(self._updates(diagram))
+            self._finished.append(Update(to_json(diagram.on(Size(*self._page)))))
         except Exception as error:  # reported by the next poll
             self._finished.append(error)
         finally:
@@ -95,25 +97,6 @@ class DiagramFeed(Feed):
         if self._declared is not None:
             return Diagram(declared_scene(self._declared), View(self._view))
         return Diagram(live_scene(topology.snapshot(states)), View(self._view))
-
-    def _updates(self, _: Diagram) -> Iterable[Update]:
-        """Return what to send of a diagram."""
-        return ()
-
-
-class PictureFeed(DiagramFeed):
-    """The diagram on a page, again whenever the graph has changed."""
-
-    def __init__(self, values: Values, declared: Declared | None) -> None:
-        width = values.number("width", _WIDTH, _MIN_SIDE, _MAX_SIDE)
-        height = values.number("height", _HEIGHT, _MIN_SIDE, _MAX_SIDE)
-        self._page = (width, height)
-        super().__init__(values, declared)
-
-    def _updates(self, diagram: Diagram) -> Iterable[Update]:
-        from composer.graph.layout import Size
-
-        yield Update(to_json(diagram.on(Size(*self._page))))
 
 
 class LiveFeed(Feed):

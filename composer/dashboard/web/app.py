@@ -23,13 +23,10 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from composer.dashboard.access import Refusal, Request
-from composer.dashboard.channels.graph import DiagramFeed
 from composer.dashboard.context import Dashboard
 from composer.dashboard.foxglove.connection import FoxgloveConnection, FoxgloveServer
 from composer.dashboard.foxglove.encoding import SUBPROTOCOLS
-from composer.dashboard.protocol.messages import RequestError, Values
-from composer.dashboard.protocol.outbox import MAX_CONNECTIONS, Update
-from composer.dashboard.ros_side import LINGER_S
+from composer.dashboard.protocol.outbox import MAX_CONNECTIONS
 from composer.dashboard.web.client import Client
 from composer.dashboard.web.connection import Connection
 
@@ -44,7 +41,6 @@ _VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log"
 #: The page shares a folder with Python code.
 _SUFFIXES = (".css", ".html", ".js", ".svg", ".txt", "LICENSE")
 _MAX_PATH = 200
-_KEY = "diagram of a page that is being loaded"
 _WITHOUT_FOXGLOVE = Refusal(404, "the dashboard was started with --no-foxglove")
 _NO_SUBPROTOCOL = Refusal(
     400, f"the WebSocket must have the subprotocol {' or '.join(SUBPROTOCOLS)}"
@@ -65,34 +61,15 @@ _STYLES = (
 _SHARED = {"": "graph", "actions": "services"}
 
 
-def prepare(dashboard: Dashboard, path: str, diagram: str) -> None:
-    """Join the ROS graph for a page, and lay out its diagram if its path is that of the graph."""
-    dashboard.ros.enter()
-    dashboard.ros.leave()  # the page connects before the dashboard leaves the graph
-    if path.split("/")[1] not in ("", "graph"):
-        return
-    try:
-        feed = DiagramFeed(Values({"view": diagram}, _KEY), dashboard.declared)
-    except RequestError:  # the page gets it when it subscribes
-        return
-
-    def receive(_: Update) -> None:
-        pass
-
-    key = f"{_KEY}: {diagram}"
-    dashboard.feeds.add(key, feed, receive)
-    asyncio.get_running_loop().call_later(LINGER_S, dashboard.feeds.remove, key, receive)
-
-
 def make_app(dashboard: Dashboard) -> AccessCheck:
     """Return the application."""
     connections: set[Client] = set()
     foxglove_server = FoxgloveServer.of(dashboard)
 
     async def index(request: HttpRequest) -> Response:
-        path = request.url.path
-        prepare(dashboard, path, request.query_params.get("view", "nodes"))
-        return _of_page(index_of(path.split("/")[1]), "text/html")
+        dashboard.ros.enter()
+        dashboard.ros.leave()  # the page connects before the dashboard leaves the graph
+        return _of_page(index_of(request.url.path.split("/")[1]), "text/html")
 
     async def page(socket: WebSocket) -> None:
         await socket.accept()
