@@ -147,7 +147,7 @@ def _seen(
         seen = _states_text({name.value: matcher.states[name.value] for name, _ in event.states})
         seen = f"{seen} at {_since(window.end_s, record)} s"
     elif matcher.other is not None:
-        seen = f"the last {_other(matcher, event, record)}"
+        seen = f"none; the last {_other(matcher, event, record)}"
     after_s = window.end_s + 2 * _EPSILON_S
     later = _matches(record.matcher(event), record, Window(0, after_s, inf), at_start=False)
     match = next(later, None)

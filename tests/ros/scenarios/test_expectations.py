@@ -57,15 +57,17 @@ EXPECTATIONS = {
     "{message: /count, within_s: 0.05}": "none; the next one at 0.1 s",
     "{message: /count, where: message.data == 7, after_s: 0.75, within_s: 0.85}": "",
     "{message: /count, where: message.data == 7, within_s: 0.5}": (
-        "the last message, at 0.5 s: message.data is 4; the next one at 0.8 s"
+        "none; the last message, at 0.5 s: message.data is 4; the next one at 0.8 s"
     ),
-    "{message: /count, where: message.data < 0}": "the last message, at 3 s: message.data is 29",
+    "{message: /count, where: message.data < 0}": (
+        "none; the last message, at 3 s: message.data is 29"
+    ),
     "{message: /count, where: 1 / message.data > 2, within_s: 0.15}": (
-        "the last message, at 0.1 s: '1 / message.data': division by zero"
+        "none; the last message, at 0.1 s: '1 / message.data': division by zero"
     ),
     "{message: /count, fields: {data: 7}, tolerance: 1, at_least: 3, at_most: 3}": "",
     "{message: /count, fields: {data: -7}, tolerance: 1}": (
-        "the last message, at 3 s: data is 29, not -7"
+        "none; the last message, at 3 s: data is 29, not -7"
     ),
     "{message: /count, at_least: 32}": "31, at 0.1 s, 0.2 s, 0.3 s, 0.4 s, 0.5 s, ...",
     "{message: /sums, where: message.data == 2, at_most: 1}": "",
@@ -78,16 +80,16 @@ EXPECTATIONS = {
         "after doubler active at 0 s, no counter active, only before, at 0 s"
     ),
     "{log: counting, node: counter}": "",
-    "{log: counting, node: doubler}": "the last line, at 3 s: [WARN] got 29",
+    "{log: counting, node: doubler}": "none; the last line, at 3 s: [WARN] got 29",
     "{log: got 400, level: warn, at_most: 1}": "",
-    "{log: got 400, level: info}": "the last line, at 3 s: [WARN] got 29",
+    "{log: got 400, level: info}": "none; the last line, at 3 s: [WARN] got 29",
     "{state: {counter: active, doubler: active}, within_s: 0.1}": "",
     "{state: {counter: inactive}, after_s: 0.1}": "counter active at 3.05 s",
     "{end_state: {counter: active}}": "",
     "{end_state: {doubler: unconfigured}}": "doubler active",
     "{response: /reset, where: response.success}": "",
     "{response: /reset, where: not response.success}": (
-        "the last response, at 1 s: response.success is True"
+        "none; the last response, at 1 s: response.success is True"
     ),
     "{result: /drive, where: status == 'succeeded', fields: {message: arrived}}": "",
     "{result: /drive, where: status == 'rejected', at_least: 1, at_most: 1}": "",
