@@ -85,6 +85,8 @@ def _files(path: Path) -> tuple[Path, ...]:
         if path.name.removesuffix(_COMPRESSED).endswith((".mcap", ".db3")):
             return (path,)
         raise BagError(f"{path} is not a bag: expected a folder, or a .mcap or .db3 file")
+    if not path.is_dir():
+        raise BagError(f"{path} is neither a file nor a folder")
     try:
         names = sorted(path.iterdir())
     except OSError as error:

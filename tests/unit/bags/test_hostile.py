@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 from pathlib import Path
 
@@ -86,3 +87,10 @@ def test_a_file_that_fills_the_disk(tmp_path: Path) -> None:
     path.write_bytes(zstandard.compress(bytes(LARGE)))
     with pytest.raises(BagError, match="contains more than 1,000 times its size"):
         open_bag(path)
+
+
+@pytest.mark.parametrize("name", ["bag", "bag.mcap", "bag.db3.zstd"])
+def test_a_pipe_is_not_read(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(BagError, match="is neither a file nor a folder"):
+        open_bag(tmp_path / name)
