@@ -55,7 +55,8 @@ def write_file(path: Path, data: bytes) -> None:
     """Write a file in a folder that exists, in place of one there. Raises CommandError."""
     is_device = path.exists() and not path.is_file()  # such as /dev/stdout or a pipe
     if path.parent.is_dir() and not is_device:
-        _write({path.resolve(): data}, replace=True)
+        # Not resolve(), which raises RuntimeError for a link to itself: such a link is replaced.
+        _write({Path(os.path.realpath(path)): data}, replace=True)
         return
     try:
         path.write_bytes(data)

@@ -53,6 +53,14 @@ def test_an_unwritable_file_is_reported(tmp_path: Path) -> None:
     assert "No such file or directory" in done.err
 
 
+def test_a_link_to_itself_is_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "p.svg"
+    target.symlink_to(target.name)
+    done = compose("graph", PIPELINE, "-o", str(target))
+    assert (done.code, done.err) == (0, f"wrote {target}\n")
+    assert target.read_text(encoding="utf-8").startswith("<svg ")
+
+
 def test_a_failed_write_leaves_the_file_as_it_was(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
