@@ -12,7 +12,7 @@ from composer.interfaces import Interfaces
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.copies import Copy, edited_copy
 from composer.python_code.checker.file_sets import FileSet
-from composer.python_code.checker.findings import SYNTAX_KINDS, Reader
+from composer.python_code.checker.findings import MISSING_RETURN, SYNTAX_KINDS, Reader
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding, Process, start_process
 from composer.python_code.checker.relevance import Relevance, reassigned
@@ -96,7 +96,11 @@ class Check:
         by_path: dict[str, list[tuple[Finding, Span]]] = {}
         for finding in findings:
             copy = self._copies.get(finding.path)
-            if copy is not None and finding.line not in copy.added:
+            # A missing 'return' is reported at the type of the result, which may be added.
+            if copy is not None and (
+                finding.message.endswith(MISSING_RETURN)
+                or not copy.is_added(finding.line, finding.column)
+            ):
                 by_path.setdefault(finding.path, []).append((finding, _span(finding, copy)))
         for path, in_file in by_path.items():
             self._unread += ((path, span) for _, span in in_file[MAX_FINDINGS : MAX_FINDINGS + 1])

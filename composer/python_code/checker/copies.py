@@ -44,6 +44,10 @@ class Copy:
     text: str
     added: frozenset[int]
 
+    def is_added(self, line: int, column: int) -> bool:
+        """Return whether the original lacks what is at a place: a line, or a result at its end."""
+        return line in self.added or column > len(self.module.source.line(self.line(line))) + 1
+
     def line(self, number: int) -> int:
         """Return the line of the original that is at a line of the copy."""
         return max(number - sum(added <= number for added in self.added), 1)
