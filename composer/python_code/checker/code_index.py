@@ -224,18 +224,6 @@ class CodeIndex:
             self._balances[scope] = _loads_without_uses(scope)
         return self._balances[scope][name] > 0
 
-    @cached_property
-    def members(self) -> Mapping[str, frozenset[str]]:
-        """The methods of each class, and the attributes of its own that it uses."""
-        found: dict[str, frozenset[str]] = {}
-        for node in self.classes:
-            if node.name not in found:
-                used = [item for item in ast.walk(node) if isinstance(item, ast.Attribute)]
-                names = {item.attr for item in used if dotted(item) == f"self.{item.attr}"}
-                methods = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
-                found[node.name] = frozenset(names | methods)
-        return found
-
     def attributes_set(self) -> Iterator[str]:
         """Yield the methods and attributes that the code defines, of any object."""
         for target, node, _ in self.assignments:

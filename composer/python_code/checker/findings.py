@@ -19,7 +19,7 @@ from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding
-from composer.python_code.checker.relevance import Relevance, unguarded_value
+from composer.python_code.checker.relevance import Relevance, is_parameter, unguarded_value
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family, Problem
@@ -103,6 +103,8 @@ class Reader:
 
     def problem(self) -> Problem | None:
         """Return what the finding means, None if it does not matter."""
+        if is_parameter(self.finding.kind, self.finding.message):
+            return self._made(Family.TYPE, "this is a Parameter, not its value", "add .value")
         if self.finding.kind in _READERS:
             return _READERS[self.finding.kind](self)
         first = self.finding.message.partition("\n")[0]
@@ -181,16 +183,9 @@ class Reader:
             return None  # most objects take any attribute
         if not is_own:
             self.about.append(f"type {named}")
-        names = self._members(named) if is_own else set[str]()
-        hint = _did_you_mean(name, names) or _meant(self.finding.message)
+        names = self.owners.attributes if is_own and not self._is_class else ()
+        hint = _meant(self.finding.message) or _did_you_mean(name, names)
         return self._in_its_words(hint=hint)
-
-    def _members(self, class_name: str) -> set[str]:
-        api = () if self._is_class else self.owners.attributes
-        return {
-            *self.code.members.get(class_name, ()),
-            *(item.removeprefix("self.") for item in api),
-        }
 
     def _unawaited_value(self) -> Problem:
         """Return the problem of a name that was assigned without 'await', where it was."""
@@ -250,7 +245,8 @@ class Reader:
         if not isinstance(target, ast.Attribute):  # a variable may change its kind
             is_annotated = isinstance(statement, ast.AnnAssign)
             return self._in_its_words() if is_annotated and not self._is_class else None
-        is_ours = dotted(target) in self.owners.attributes and not self._is_class
+        is_own = dotted(target.value) == "self" and not self._is_class
+        is_ours = is_own and target.attr in self.owners.attributes
         return self._in_its_words() if is_ours else None
 
     def _keyword(self) -> Problem:

@@ -82,9 +82,8 @@ class Owners:
 
     @cached_property
     def attributes(self) -> frozenset[str]:
-        """The attributes that the composer sets, as code names them."""
-        names = behavior.Behavior.__slots__
-        return frozenset(f"self.{name}" for name in names if name[0] != "_")
+        """The attributes of behaviors that the composer sets."""
+        return frozenset(name for name in behavior.Behavior.__slots__ if name[0] != "_")
 
     def _definition(self, name: str) -> Message | None:
         """Return a message by its full name, or the part ``package/srv/Name_Request``."""

@@ -19,21 +19,21 @@ from composer.base.fast_dataclass import dataclass
 from composer.python_code.checker.file_sets import package_folders
 from composer.python_code.problems import CheckerFailed
 
-#: Kinds that the composer checks itself, or that say nothing about what happens at run time.
-_IGNORED = (
-    "bad-override-param-name",
-    "deprecated",
-    "implicit-import",
-    "missing-source",
-    "missing-source-for-stubs",
-    "not-required-key-access",
-    "redundant-cast",
-    "redundant-condition",
-    "unnecessary-type-conversion",
-    "untyped-import",
+#: The kinds that may be mistakes; the others are about annotations and definitions.
+_KINDS = (
+    *("bad-argument-count", "bad-argument-type", "bad-assignment", "bad-context-manager"),
+    *("bad-function-definition", "bad-index", "bad-keyword-argument", "bad-match", "bad-raise"),
+    *("bad-return", "bad-unpacking", "invalid-argument", "invalid-syntax", "missing-argument"),
+    *("missing-attribute", "missing-import", "missing-module-attribute", "no-matching-overload"),
+    *("not-async", "not-callable", "not-iterable", "parse-error", "read-only", "regex"),
+    *("unbound-name", "unexpected-keyword", "unknown-name", "unsupported-operation"),
+    "unused-coroutine",
 )
 #: Kinds that are off by default and point to mistakes.
-_REPORTED = ("incompatible-comparison", "invalid-format-spec", "unreachable-except-clause")
+_OFF_BY_DEFAULT = (
+    *("implicit-bool", "incompatible-comparison", "invalid-format-spec"),
+    "unreachable-except-clause",
+)
 TIME_LIMIT_S = 60.0
 #: The files that the checker writes.
 _OUTPUTS = ("output.json", "errors.txt")
@@ -146,8 +146,8 @@ def _options(search_paths: Iterable[str]) -> list[str]:
     # A list that is empty at first may get publishers of several types.
     options += ["--infer-with-first-use=false"]
     options += ["--disable-search-path-heuristics=true", "--use-ignore-files=false"]
-    options += [f"--ignore={kind}" for kind in _IGNORED]
-    options += [f"--error={kind}" for kind in _REPORTED]
+    options += [f"--only={kind}" for kind in (*_KINDS, *_OFF_BY_DEFAULT)]
+    options += [f"--error={kind}" for kind in _OFF_BY_DEFAULT]
     options += [f"--search-path={path}" for path in search_paths]
     return [*options, *(f"--site-package-path={path}" for path in package_folders())]
 

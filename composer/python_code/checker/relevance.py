@@ -28,21 +28,9 @@ _ALWAYS = frozenset({"invalid-syntax", "missing-import", "missing-module-attribu
 _KINDS_ABOUT_TYPES = frozenset(
     {"bad-argument-type", "bad-index", "not-async", "not-iterable", "unsupported-operation"}
 )
-#: All kinds that may be mistakes; the others are about annotations and definitions.
-_KINDS = (
-    _CERTAIN_KINDS
-    | _KINDS_ABOUT_TYPES
-    | {
-        "bad-assignment",
-        "bad-context-manager",
-        "bad-keyword-argument",
-        "bad-match",
-        "bad-return",
-        "bad-unpacking",
-    }
-    | {"incompatible-comparison", "invalid-argument", "invalid-format-spec", "missing-attribute"}
-    | {"no-matching-overload", "read-only", "regex", "unbound-name"}
-    | {"unreachable-except-clause"}
+#: What happens to a parameter whose value is meant.
+_USES_OF_PARAMETERS = frozenset(
+    {"bad-assignment", "implicit-bool", "invalid-format-spec", "unsupported-operation"}
 )
 _NUMPY = r"\b(?:(?:ndarray|dtype|numpy|(?:un)?signedinteger|floating|bool_)\b|generic\[)"
 _ROS = (
@@ -85,18 +73,24 @@ class Relevance:
             line = span.file.line(span.line)
             is_used = re.match(r"\s*(global |nonlocal |self\.\w+\s*:)", line) is None
             return is_used and span.text in self.code.names
+        if is_parameter(kind, message):
+            statements = (statement for _, statement in self.code.assigned_at(span.line))
+            is_declared = any(isinstance(item, ast.AnnAssign) for item in statements)
+            return self.is_class and (kind != "bad-assignment" or is_declared)
         if kind in _ALWAYS or message.startswith(("No attribute", "Instance method")):
             return True
-        return not self._is_loose_code(kind, message, span) and self._is_kept(kind, message, span)
+        return not self._is_loose_code(message, span) and self._is_kept(kind, message, span)
 
-    def _is_loose_code(self, kind: str, message: str, span: Span) -> bool:
+    def _is_loose_code(self, message: str, span: Span) -> bool:
         """Return whether the code is such that a finding in its line says little."""
-        if kind not in _KINDS or re.search(_NUMPY, message) or self.code.is_guarded(span.line):
+        if re.search(_NUMPY, message) or self.code.is_guarded(span.line):
             return True
         is_reassigned = not self.reassigned.isdisjoint(re.findall(r"\w+", span.text))
         return is_reassigned or self.code.has_loose_names(span.line)
 
     def _is_kept(self, kind: str, message: str, span: Span) -> bool:
+        if kind in ("implicit-bool", "bad-function-definition"):
+            return False
         if kind == "unbound-name":
             return not self.is_class and "may be" not in message
         if kind == "bad-return" and self.is_class:  # other annotations may be wrong
@@ -182,6 +176,11 @@ def reassigned(code: CodeIndex, lines: Iterable[int]) -> frozenset[str]:
     targets = (dotted(target) for line in lines for target, _ in code.assigned_at(line))
     names = (name.removeprefix("self.") for name in targets)
     return frozenset(name for name in names if name and "." not in name)
+
+
+def is_parameter(kind: str, message: str) -> bool:
+    """Return whether a parameter of rclpy is in the place of its value."""
+    return kind in _USES_OF_PARAMETERS and "`Parameter`" in message
 
 
 def _arity(function: str) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from composer.base.diagnostics import nearest
 from composer.python_code.checks.scopes import Code, NodeScope
@@ -32,13 +32,6 @@ def node_class_problems(code: Code) -> Iterator[Problem]:
     yield from _undeclared(code)
     for scope in code.scopes:
         yield from _incomplete_profiles(scope)
-        if scope.function is None or scope.method is None:
-            continue
-        for node in scope.nodes:
-            for value in _values_used(node):
-                if _is_parameter(value, scope):
-                    message = "this is a Parameter, not its value"
-                    yield scope.problem(Family.TYPE, message, value, "add .value")
 
 
 def _undeclared(code: Code) -> Iterator[Problem]:
@@ -97,25 +90,6 @@ def _incomplete_profiles(scope: NodeScope) -> Iterator[Problem]:
                 if is_profile and {"depth", "history", None}.isdisjoint(x.arg for x in keywords):
                     message = "a QoSProfile needs its depth or its history"
                     yield scope.problem(Family.ARGUMENTS, message, node, "add 'depth=10'")
-
-
-def _values_used(node: ast.AST) -> Sequence[ast.expr]:
-    """Return what a condition or a format takes the value of; other uses raise an error."""
-    match node:
-        case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
-            return (left, right)
-        case ast.If(test=value) | ast.While(test=value) | ast.UnaryOp(op=ast.Not(), operand=value):
-            return (value,)
-        case ast.FormattedValue(value=value, format_spec=ast.JoinedStr()):
-            return (value,)
-        case ast.AnnAssign(annotation=ast.Name(id="bool" | "float" | "int" | "str"), value=value):
-            return (value,) if value is not None else ()
-    return ()
-
-
-def _is_parameter(node: ast.expr, scope: NodeScope) -> bool:
-    value = scope.value(node.id) if isinstance(node, ast.Name) else node
-    return isinstance(value, ast.Call) and dotted(value.func) == "self.get_parameter"
 
 
 def _missing_calls(code: Code) -> Iterator[Problem]:

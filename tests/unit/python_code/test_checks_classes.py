@@ -109,30 +109,6 @@ PARAMETERS = [
     self.node.get_parameter('rate')
     self.get_parameter(self.name)
     """,
-    """
-    self.declare_parameter('rate', 1.0)
-    rate = self.get_parameter('rate')
-    if rate == 3:  # TYPE
-        pass
-    if not rate:  # TYPE
-        pass
-    while self.get_parameter('rate'):  # TYPE
-        pass
-    f"{rate:.2f}"  # TYPE
-    """,
-    """
-    self.declare_parameter('rate', 1.0)
-    rate: float = self.get_parameter('rate')  # TYPE
-    other: object = self.get_parameter('rate')
-    """,
-    """
-    self.declare_parameter('rate', 1.0)
-    rate = self.get_parameter('rate')
-    if rate.value > 3 and rate is not None:
-        print(f"{rate} {rate.value:.2f}", "%s" % rate, str(rate))
-    1.0 / self.get_parameter('rate').value
-    rate.value == 3.0 or rate.get_parameter_value().double_value
-    """,
 ]
 
 

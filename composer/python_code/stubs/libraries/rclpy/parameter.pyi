@@ -27,6 +27,9 @@ class Parameter:
     def __init__(
         self, name: str, type_: Parameter.Type | None = None, value: Any = None
     ) -> None: ...
+    # Comparing identities is never meant: what is compared has to be the value.
+    __eq__: None  # type: ignore[assignment]
+    __ne__: None  # type: ignore[assignment]
     @property
     def name(self) -> str: ...
     @property
