@@ -6,8 +6,8 @@ check: each gets a check of its own.
 
 from __future__ import annotations
 
-import ast
 import itertools
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
@@ -29,7 +29,6 @@ from composer.python_code.stubs.behaviors import (
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
 from composer.python_code.syntax import Module
-from composer.python_code.trees import public_module, walk
 from composer.typed import SUFFIX
 
 _FILES = "files"
@@ -143,25 +142,18 @@ class FileSet:
 
     def stubs(self, interfaces: Interfaces) -> dict[str, str]:
         """Return the stubs that the files need, by their names below the folder of the check."""
+        texts = [module.source.text for module in self.modules]
+        words = {word for text in texts for word in re.findall(r"[^\W_]\w*", text)}
+        words |= {word.partition("_")[0] for word in words}  # of Trigger_Request
+        uses_rclpy = "rclpy" in words or any("self.node" in text for text in texts)
         names = {port.interface.value for node in self.behaviors.values() for port in node.ports}
         names.update(_API_MESSAGES)
-        packages: set[str] = set()
-        typed: set[str] = set()  # also the class of a base type, of which a node type inherits
-        for module in self.modules:
-            for imported, name in _imports(module.tree):
-                package, _, folder = imported.partition(".")
-                if package == "rclpy" or "self.node" in module.source.text:
-                    packages |= _RCLPY_PACKAGES
-                if imported == "composer.typed" and name.endswith(SUFFIX):
-                    typed.add(name)
-                if folder in FOLDERS and name not in ("", "*"):
-                    names |= {f"{package}/{folder}/{name}", f"{package}/{folder}/{_whole(name)}"}
-                else:
-                    packages.add(package)
-        packages &= interfaces.packages()
-        for folder in FOLDERS if packages else ():
-            listed = interfaces.names(folder)
-            names.update(name for name in listed if name.partition("/")[0] in packages)
+        for name in (name for folder in FOLDERS for name in interfaces.names(folder)):
+            package, _, short = name.split("/")
+            if {package, short} <= words or (uses_rclpy and package in _RCLPY_PACKAGES):
+                names.add(name)
+        # A class may also be derived from the base of a node type that another one extends.
+        typed = {word for word in words if word.endswith(SUFFIX)} - {SUFFIX}
         files = message_stubs(interfaces, sorted(names))
         files["composer/__init__.pyi"] = ""
         files["composer/behavior.pyi"] = api_stub()
@@ -204,20 +196,6 @@ def _unused_name(node: Node, taken: Mapping[str, Node]) -> str:
     name = behavior_class_name(type_name.value)
     numbered = (f"{name}{number}" for number in itertools.count(2))
     return next(each for each in itertools.chain([name], numbered) if each not in taken)
-
-
-def _imports(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """Yield the modules that a file imports anywhere, with the name that it takes from each."""
-    for node in walk(tree.body, closed=(ast.expr,)):
-        if isinstance(node, ast.Import):
-            yield from ((item.name, "") for item in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            yield from ((public_module(node.module), item.name) for item in node.names)
-
-
-def _whole(name: str) -> str:
-    """Return the service or action of a part such as ``Trigger_Request``."""
-    return name.partition("_")[0]
 
 
 def _import_root(module: Module) -> tuple[str, Path]:
