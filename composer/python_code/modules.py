@@ -5,13 +5,10 @@ from __future__ import annotations
 import importlib.machinery
 import importlib.util
 import io
-import os
 import sys
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from functools import lru_cache
-from itertools import islice
 from pathlib import Path
 
 from composer.base.diagnostics import nearest
@@ -24,8 +21,6 @@ from composer.project import Project
 MAXIMUM_BYTES = 250_000
 #: Files of these types in a package may be modules that are compiled when it is built.
 _COMPILED = (".c", ".cpp", ".pyx", ".pyd", ".so")
-_MODULES = (".py", ".pyi", *_COMPILED)
-_MAXIMUM_FILES = 2000  # in a folder
 
 #: Other codecs of Python may take quadratic time, or do not encode text.
 _ENCODINGS = frozenset({"utf-8", "utf-8-sig", "ascii", "us-ascii", "iso-8859-1", "iso-8859-15"})
@@ -181,7 +176,7 @@ class NearbyModules:
     def hint(self) -> str | None:
         """The name that was most likely meant, as a hint; also one that is installed."""
         installed = () if self.package else _modules_in(map(Path, sys.path))
-        close = self.similar or nearest(self.missing, filter(str.isidentifier, installed))
+        close = self.similar or nearest(self.missing, [name for name, _ in installed])
         return f"did you mean '{close}'?" if close is not None else None
 
 
@@ -193,32 +188,24 @@ def nearby_modules(module: str, folders: Iterable[Path]) -> NearbyModules:
         inner = [*_package_folders(parts[:count], bases)]
         if inner:
             places, package = inner, count
-    names = _modules_in(places)
+    modules = [*_modules_in(places)]
     return NearbyModules(
         package=".".join(parts[:package]),
         missing=parts[package],
-        names=tuple(filter(str.isidentifier, names)),
-        may_be_compiled=bool(package) and any(suffix in _COMPILED for suffix in names.values()),
+        names=[name for name, _ in modules],
+        may_be_compiled=bool(package) and any(suffix in _COMPILED for _, suffix in modules),
     )
 
 
-def _modules_in(folders: Iterable[Path]) -> dict[str, str]:
-    """Return the names of the files and folders that may be modules, with their suffixes."""
-    modules: dict[str, str] = {}
+def _modules_in(folders: Iterable[Path]) -> Iterator[tuple[str, str]]:
+    """Yield the names of the files and folders that may be modules, with their suffixes."""
     for folder in folders:
         with suppress(OSError, ValueError):
-            modules |= _modules_in_folder(folder, folder.stat().st_mtime_ns)
-    return modules
-
-
-@lru_cache(maxsize=64)
-def _modules_in_folder(folder: Path, changed_ns: int) -> dict[str, str]:  # noqa: ARG001 - a key
-    with os.scandir(folder) as items:
-        return {
-            item.name.partition(".")[0]: Path(item.name).suffix
-            for item in islice(items, _MAXIMUM_FILES)
-            if item.name.endswith(_MODULES) or item.is_dir()
-        }
+            for item in folder.iterdir():
+                name, _, rest = item.name.partition(".")
+                is_module = item.suffix in (".py", ".pyi", *_COMPILED) or not rest
+                if is_module and name.isidentifier():
+                    yield name, item.suffix
 
 
 def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:
