@@ -115,6 +115,9 @@ class _Behaviors:
     def behavior(self, node: DeclaredNode, behavior: object) -> None:
         self.latest[node.name.value] = behavior
 
+    def callback(self, _node: str, _name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        return function
+
     def timer(self, _node: str, _timer: str, tick: Callable[[], None]) -> Callable[[], None]:
         return tick
 
