@@ -20,6 +20,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -44,19 +45,50 @@ def signal_watchdog(wakeup_fd: int, limit_s: float) -> Iterator[None]:
     wrote.
     """
     faulthandler.enable(file=2)
-    words = (__file__, str(wakeup_fd), str(os.getpid()), str(limit_s))
-    watchdog = subprocess.Popen(  # noqa: S603 - this file
-        [sys.executable, "-I", "-S", *words],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        pass_fds=(wakeup_fd,),
-        start_new_session=True,  # Ctrl-C is for the system
-    )
+    watchdog = _Watchdog(wakeup_fd, limit_s)
     try:
         yield
     finally:
-        watchdog.kill()
-        watchdog.wait()
+        watchdog.close()
+
+
+class _Watchdog:
+    """The small process, which is started again if something kills it."""
+
+    def __init__(self, wakeup_fd: int, limit_s: float) -> None:
+        self._wakeup_fd = wakeup_fd
+        self._limit_s = limit_s
+        self._changing = threading.Lock()
+        self._is_closed = False
+        self._process = self._started()
+        threading.Thread(target=self._keep_running, name="watchdog", daemon=True).start()
+
+    def close(self) -> None:
+        """End it."""
+        with self._changing:
+            self._is_closed = True
+        self._process.kill()
+        self._process.wait()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        words = (__file__, str(self._wakeup_fd), str(os.getpid()), str(self._limit_s))
+        return subprocess.Popen(  # noqa: S603 - this file
+            [sys.executable, "-I", "-S", *words],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=(self._wakeup_fd,),
+            start_new_session=True,  # Ctrl-C is for the system
+        )
+
+    def _keep_running(self) -> None:
+        with suppress(OSError):  # no process can be started: the system runs without a watchdog
+            while True:
+                self._process.wait()
+                time.sleep(_INTERVAL_S)
+                with self._changing:
+                    if self._is_closed:
+                        return
+                    self._process = self._started()
 
 
 def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:

@@ -24,8 +24,8 @@ from tests.ros.support.system_process import PATIENCE_S, RunningSystem
 RESTARTS = "{max_attempts: 10000, window_ms: 3600000, backoff_ms: 20, backoff_max_ms: 200}"
 KILL_PERIOD_S = 3.0
 KILLS = 10
-#: The system, its dashboard, the launcher, the executable and the other process.
-PROCESSES = 5
+#: The system, its dashboard, the launcher, the executable, the other process, and two watchdogs.
+PROCESSES = 7
 #: Of the system, and of the dashboard next to it, which joins and leaves the ROS graph. In 100
 #: kills they take 3 and 2 MB. A plain rclpy program that joins and leaves takes 9 MB, and 0.5 MB
 #: if it stays: glibc keeps free memory, which the dashboard returns.

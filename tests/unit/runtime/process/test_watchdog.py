@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -78,3 +80,28 @@ def test_a_process_that_ends_in_order(
             time.sleep(pause_s)  # the times of the signals are what is tested
         _, errors = process.communicate(timeout=60.0)
     assert (process.returncode, errors) == (IN_ORDER, "")
+
+
+def _children(process: int) -> list[int]:
+    files = Path(f"/proc/{process}/task").glob("*/children")
+    return [int(number) for file in files for number in file.read_text(encoding="ascii").split()]
+
+
+def test_a_watchdog_that_is_killed_is_started_again() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "other", 'print("holding", flush=True)'],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        [first] = _children(process.pid)
+        os.kill(first, signal.SIGKILL)
+        end_s = time.monotonic() + 60.0
+        while not (children := _children(process.pid)) or children == [first]:
+            assert time.monotonic() < end_s
+            time.sleep(0.05)  # poll: nothing announces it
+        assert len(children) == 1
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == IN_ORDER
+    assert not Path(f"/proc/{children[0]}").exists()
