@@ -107,7 +107,7 @@ class AdoptedNode(Node):
     @property
     def executor(self) -> Any:
         """What runs the node's callbacks."""
-        return self._composer_instance.context.node.executor
+        return self._composer_instance.executor
 
     @executor.setter
     def executor(self, _: Any) -> None:

@@ -31,6 +31,7 @@ from composer.runtime.executors.futures import Awaited, Future, done_event
 from composer.runtime.executors.strand import ExclusiveStrand, ReentrantStrand, Strand
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.declared_ports import DeclaredPorts
+from composer.runtime.hosting.executor import InstanceExecutor
 from composer.runtime.hosting.user_code import (
     PermittedFunction,
     UserCode,
@@ -155,6 +156,8 @@ class Instance(UserCode):
         self._gates: list[tuple[LifecycleGate, bool, bool]] = []
         #: The parameters as they were declared.
         self.declared: dict[str, Parameter] = {}
+        #: ``self.executor`` of the class.
+        self.executor = InstanceExecutor(self, self.spin, self.spin_once)
         #: The executors of the class's own that the node was added to.
         self.executors: list[Executor] = []
         #: Services of the ROS node that exist as long as the instance.

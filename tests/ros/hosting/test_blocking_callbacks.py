@@ -75,6 +75,24 @@ def test_a_callback_that_blocks_is_logged_once_with_its_place(
         assert system.log_text().count("on_wait has not returned") == 1
 
 
+def test_tasks_of_an_executor_block_as_callbacks_do(
+    tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(health_monitor, "BLOCKS_AFTER_S", 0.1)
+    text = f'system: working\nnodes: {{tasks: {{class: "{CLASSES}:Tasks"}}}}'
+    with running(text, tmp_path) as system:
+        call = peer.begin(Trigger, "/wait")
+        for name in ("plain", "awaits"):
+            assert "callback_classes.py:" in system.wait_for_log(f"{name} has not returned")
+        peer.publisher(Int64, "/numbers").publish(Int64(data=1))
+        assert finished(call).success
+        assert system.node("tasks").instance.results == ["a", "bc", "d", "no"]
+        system.wait_for_log("on_done has not returned")
+        outcome = system.stop()
+    assert [(node.state, node.errors) for node in outcome.nodes] == [("finalized", 1)]
+    assert "on_done is interrupted; it is at" in system.log_text()
+
+
 DECLARED = """
         publishers: {stopped: {type: std_msgs/msg/Int64, qos: command, external: true}}
         subscriptions: {numbers: {type: std_msgs/msg/Int64, qos: command}}

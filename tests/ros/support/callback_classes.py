@@ -306,3 +306,48 @@ class Busy(Node):
         rate.sleep()
         self.destroy_rate(rate)
         self.naps += 1
+
+
+class Tasks(Node):
+    """Creates tasks of all kinds, and spins its executor until they are done."""
+
+    def __init__(self) -> None:
+        super().__init__("tasks")
+        self.results: list[Any] = []
+        self.arrived = threading.Event()
+        group = ReentrantCallbackGroup()
+        self.create_subscription(
+            Int64, "numbers", lambda _: self.arrived.set(), 10, callback_group=group
+        )
+        self.create_service(Trigger, "wait", self.on_wait)
+
+    def on_wait(self, _: Any, response: Any) -> Any:
+        create: Any = self.executor.create_task  # type: ignore[union-attr]
+        tasks = [
+            create(self.plain, "a"),
+            create(self.awaits, "b", end="c"),
+            create(self.awaits("d")),
+        ]
+        tasks += [create(self.fails)]
+        for task in tasks:
+            self.executor.spin_until_future_complete(task)  # type: ignore[union-attr]
+        self.results = [str(task.exception() or task.result()) for task in tasks]
+        response.success = True
+        future = rclpy.task.Future(executor=self.executor)
+        future.add_done_callback(self.on_done)
+        future.set_result(None)
+        return response
+
+    def plain(self, text: str) -> str:
+        self.arrived.wait()
+        return text
+
+    async def awaits(self, text: str, end: str = "") -> str:
+        self.arrived.wait()
+        return text + end
+
+    def fails(self) -> None:
+        raise ValueError("no")
+
+    def on_done(self, _: Any) -> None:
+        threading.Event().wait()

@@ -1,0 +1,88 @@
+"""``self.executor`` of a hosted class: its tasks are code of the class, as its callbacks are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from functools import partial
+from typing import Any
+
+from rclpy.task import Future as RclpyFuture
+
+from composer.runtime.executors.futures import Awaited
+from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.tasks import name_of
+from composer.runtime.hosting.user_code import UserCode, UserFunction
+
+#: Packages that create tasks for their own functions. These call code of the class as such.
+_OTHERS = frozenset({"composer", "rclpy"})
+
+
+class InstanceExecutor:
+    """The part of ``rclpy.executors.Executor`` that classes use.
+
+    While a task blocks, others run. It is reported and interrupted as a callback is.
+    """
+
+    def __init__(
+        self,
+        code: UserCode,
+        spin: Callable[[Awaited, float | None], None],
+        spin_once: Callable[[float | None], None],
+    ) -> None:
+        """``spin`` waits for a future, ``spin_once`` for the end of a callback."""
+        self._code = code
+        self._context = code.context  # by which a task on a stack is recognized
+        #: That of the ROS node, which rclpy's own functions use.
+        self._of_rclpy: Any = code.context.node.executor
+        self._spin = spin
+        self._spin_once = spin_once
+
+    def create_task(
+        self,
+        callback: Callable[..., Any] | Coroutine[Any, Any, Any],
+        *arguments: Any,
+        **options: Any,
+    ) -> RclpyFuture:
+        """Run a function, plain or ``async def``, or a coroutine; return the future of its result.
+
+        An exception is one of the future, and an error of the node.
+        """
+        if str(getattr(callback, "__module__", None)).partition(".")[0] in _OTHERS:
+            task: RclpyFuture = self._of_rclpy.create_task(callback, *arguments, **options)
+            return task
+        if isinstance(callback, Coroutine):
+            function = UserFunction(self._code, lambda: callback)
+        else:
+            function = UserFunction(self._code, partial(callback, *arguments, **options))
+        function.__name__ = name_of(callback).rpartition(".")[2]
+        outcome = RclpyFuture(executor=self)
+        self._context.spawn(self._run(function, outcome))
+        return outcome
+
+    @calls_user_code
+    async def _run(self, function: UserFunction, outcome: RclpyFuture) -> None:
+        try:
+            result = function()
+            outcome.set_result(await result if isinstance(result, Coroutine) else result)
+        except BaseException as error:
+            outcome.set_exception(error)
+            outcome.exception()  # rclpy prints those that are never retrieved
+            self._context.on_exception(function.__name__, error)
+
+    def spin_until_future_complete(self, future: Awaited, timeout_sec: float | None = None) -> None:
+        """Wait for a future, or for a time."""
+        self._spin(future, timeout_sec)
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Wait until a callback has ended, or for a time."""
+        self._spin_once(timeout_sec)
+
+    def wake(self) -> None:
+        """Serve entities that were created or destroyed."""
+        self._of_rclpy.wake()
+
+    def add_node(self, node: object) -> None:
+        """Do nothing: the composer serves the node."""
+
+    def remove_node(self, node: object) -> None:
+        """Do nothing: the node is served until it is cleaned up."""
