@@ -43,7 +43,8 @@ class FoundParameter:
 class FoundNode:
     """A node. ``keys`` are those that say what implements it, such as ``external``.
 
-    ``namespace`` is absolute. ``container`` is the full name of the node that loads it.
+    ``namespace`` is absolute. Of the nodes with one full name, only one is there at a time; each
+    has a ``version``. ``container`` is the full name and the version of the node that loads it.
     """
 
     name: str
@@ -53,7 +54,8 @@ class FoundNode:
     parameters: tuple[FoundParameter, ...] = ()
     remappings: Mapping[str, str] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
-    container: str = ""
+    container: tuple[str, tuple[int, ...]] | None = None
+    version: tuple[int, ...] = (0,)
 
     @property
     def full_name(self) -> str:

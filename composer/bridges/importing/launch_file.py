@@ -50,7 +50,7 @@ def describe_launch_file(
     )
     lost: list[str] = []
     sections = _sections_of_all(report, lost)
-    items = [*_items(report)]
+    items = [*_by_containers([*_items(report)], [visit["values"] for visit in visits])]
     names_in_use = _names_in_use(report["arguments"], items)
     arguments = [item for item in report["arguments"] if item["name"] in names_in_use]
     left_out += (
@@ -100,6 +100,8 @@ def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
         for item in reversed(present.values()):
             samples |= item.pop("samples")
         sections = {name for item in present.values() for name in item.pop("sections")}
+        # What a system has no key for does not make it another node.
+        lost = [text for item in present.values() for text in item["process"].pop("left_out")]
         for item, numbers in unified_groups(present, values):
             for part in _expressible(values, numbers):
                 yield {
@@ -108,6 +110,36 @@ def _items(report: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
                     "present": frozenset(part),
                     "condition": condition(values, part),
                     "samples": samples,
+                    "left_out": lost,
+                }
+
+
+def _by_containers(
+    items: Sequence[dict[str, Any]], values: Sequence[Mapping[str, str]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the nodes with their versions; a component once for each version of its container."""
+    versions: dict[str, list[dict[str, Any]]] = {}
+    for item in items:
+        same = versions.setdefault(join_node_name(item["namespace"], item["name"] or ""), [])
+        item["version"] = (len(same),)
+        same.append(item)
+    for item in items:
+        if item.get("component") is None:
+            yield item
+            continue
+        full_name = join_node_name(*item["container"])
+        rest = item["present"]
+        # The last one stands for the visits in which the launch file does not start a container.
+        for number, container in enumerate([*versions.get(full_name, ()), item]):
+            present = rest & container["present"]
+            rest -= present
+            for part in _expressible(values, sorted(present)) if present else ():
+                yield {
+                    **item,
+                    "container": (full_name, (number,)),
+                    "version": (*item["version"], number),
+                    "present": frozenset(part),
+                    "condition": condition(values, part),
                 }
 
 
@@ -198,7 +230,7 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
     lifecycle = _lifecycle(item["process"], full_name, left_out)
     if lifecycle:
         keys["lifecycle"] = lifecycle
-    left_out += (f"{text} (of {full_name})" for text in item["process"]["left_out"])
+    left_out += (f"{text} (of {full_name})" for text in item["left_out"])
     left_out += item["problems"]
     return FoundNode(
         name=name,
@@ -207,7 +239,8 @@ def _node(item: Mapping[str, Any], name: str, left_out: list[str]) -> FoundNode:
         parameters=tuple(_declared(item, full_name, left_out)),
         remappings=item["remappings"],
         comments=comments,
-        container=join_node_name(*item["container"]) if component is not None else "",
+        container=item["container"] if component is not None else None,
+        version=item["version"],
     )
 
 
@@ -215,16 +248,17 @@ def _external_containers(
     nodes: Sequence[FoundNode], items: Sequence[Mapping[str, Any]], visits: Sequence[Any]
 ) -> Iterable[FoundNode]:
     """Yield the containers that the launch file does not start, each with its condition."""
-    started = {node.full_name for node in nodes}
-    present: dict[str, set[int]] = {}
+    started = {(node.full_name, node.version) for node in nodes}
+    present: dict[tuple[str, tuple[int, ...]], set[int]] = {}
     for node, item in zip(nodes, items, strict=True):
-        if node.container and node.container not in started:
+        if node.container is not None and node.container not in started:
             present.setdefault(node.container, set()).update(item["present"])
-    for full_name, numbers in present.items():
+    for (full_name, version), numbers in present.items():
         namespace, name = split_node_name(full_name)
         keys: dict[str, Plain] = {**condition([visit["values"] for visit in visits], numbers)}
+        keys["external"] = True
         comment = "The launch file loads components into it, and does not start it."
-        yield FoundNode(name, namespace, {**keys, "external": True}, comments=(comment,))
+        yield FoundNode(name, namespace, keys, comments=(comment,), version=version)
 
 
 def _names(items: Iterable[Mapping[str, Any]], left_out: list[str]) -> list[str]:

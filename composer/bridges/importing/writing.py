@@ -42,7 +42,7 @@ def write_system(found: FoundSystem, parameter_file: str | None = None) -> str:
         comments[()] += ("", "Left out:", *(f"- {text}" for text in listed), *more)
     nodes: dict[str, Plain] = {}
     keys = node_keys(found.nodes)
-    key_of = {node.full_name: key for key, node in keys.items()}
+    key_of = {(node.full_name, node.version): key for key, node in keys.items()}
     for key, node in keys.items():
         container = {"container": key_of[node.container]} if node.container else {}
         written = replace(node, keys={**node.keys, **container})

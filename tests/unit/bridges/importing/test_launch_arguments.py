@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
+from composer.base.diagnostics import Severity
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
 from composer.launch.variants import all_visits, mark
@@ -126,6 +127,39 @@ def test_what_differs_in_another_way_has_a_condition_for_each() -> None:
     )
     assert (second["executable"]["arguments"], conditions(second)) == (["-x"], {"if": "fast"})
     assert {first.get("name", "nav"), second["name"]} == {"nav"}
+
+
+def test_components_are_in_the_container_that_is_there(tmp_path: Path) -> None:
+    component = {"package": "demo", "plugin": "demo::Camera"}
+
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        # A prefix is left out, so it does not make another container.
+        prefix = {"left_out": ["prefix: gdb"] * (values["gdb"] == "true")}
+        arguments = ["-x"] if values["fast"] == "true" else ["-y", "-z"]
+        box = node("box", arguments=arguments, process=prefix)
+        camera = node("camera", component=component, container=("/", "box"))
+        return [camera] if values["own"] == "false" else [box, camera]
+
+    names = ("fast", "gdb", "own")
+    system, left_out = visited(nodes, *(argument(name, "true") for name in names))
+    file = tmp_path / "s.yaml"
+    file.write_text(yaml.safe_dump(system))
+    assert not [item for item in load(file).diagnostics if item.severity is Severity.ERROR]
+    containers = {
+        item["container"]: (name, conditions(item))
+        for name, item in system["nodes"].items()
+        if "container" in item
+    }
+    assert containers == {
+        "box": ("camera", {"if": "own and fast"}),
+        "box_2": ("camera_2", {"if": "own and not fast"}),
+        "box_3": ("camera_3", {"unless": "own"}),
+    }
+    assert conditions(system["nodes"]["box_3"]) == {"unless": "own"}
+    assert left_out == (
+        "argument gdb: no node depends on it",
+        "prefix: gdb (of /box)",
+    )
 
 
 @pytest.mark.parametrize(
