@@ -112,6 +112,8 @@ def test_up_and_down_in_order_with_names_and_parameters(tmp_path: Path, peer: Pe
         system.wait_for_log("managed")
         known = [str(pid) for pid in (*pids, os.getpid())]
         wait_until(lambda: [node.pid for node in system.report().nodes] == known, "the processes")
+        rates = [(node.sent_hz, node.received_hz) for node in system.report().nodes[:2]]
+        assert rates == [(None, None), (None, None)]  # not 0: they are not known
 
         # As other ROS nodes see it.
         echoed = peer.listen(String, "/echo")
