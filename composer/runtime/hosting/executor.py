@@ -78,8 +78,7 @@ class InstanceExecutor:
         self._spin_once(timeout_sec)
 
     def wake(self) -> None:
-        """Serve entities that were created or destroyed."""
-        self._of_rclpy.wake()
+        """Do nothing: entities are served once they are created."""
 
     def add_node(self, node: object) -> None:
         """Do nothing: the composer serves the node."""
