@@ -11,6 +11,8 @@ import pytest
 from composer.dashboard.protocol.messages import BadRequestError, RequestError
 from composer.dashboard.recordings import Recordings
 
+pytest.importorskip("rclpy", reason="recordings need ROS")
+
 LOOKS = 300
 
 
