@@ -81,9 +81,9 @@ class _Watchdog:
         )
 
     def _keep_running(self) -> None:
-        with suppress(OSError):  # no process can be started: the system runs without a watchdog
-            while True:
-                self._process.wait()
+        """Start it again once a signal has ended it; where it cannot run, do without it."""
+        with suppress(OSError):  # no process can be started
+            while self._process.wait() < 0:
                 time.sleep(_INTERVAL_S)
                 with self._changing:
                     if self._is_closed:
@@ -169,4 +169,5 @@ def _end(descriptor: int, name: str) -> None:
 
 
 if __name__ == "__main__":
-    _watch(socket.socket(fileno=int(sys.argv[1])), int(sys.argv[2]), float(sys.argv[3]))
+    with suppress(OSError):  # a kernel without pidfd_open, or a container that forbids it
+        _watch(socket.socket(fileno=int(sys.argv[1])), int(sys.argv[2]), float(sys.argv[3]))

@@ -6,10 +6,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
+
+from composer.runtime.process.watchdog import signal_watchdog
 
 IN_ORDER = 7
 GRACE_S = 3.0
@@ -105,3 +108,11 @@ def test_a_watchdog_that_is_killed_is_started_again() -> None:
         process.send_signal(signal.SIGINT)
         assert process.wait(60.0) == IN_ORDER
     assert not Path(f"/proc/{children[0]}").exists()
+
+
+def test_a_watchdog_that_cannot_run_is_not_started_again(capfd: pytest.CaptureFixture[str]) -> None:
+    with Path(os.devnull).open("rb") as no_socket, signal_watchdog(no_socket.fileno(), GRACE_S):
+        [keeper] = (thread for thread in threading.enumerate() if thread.name == "watchdog")
+        keeper.join(60.0)
+        assert not keeper.is_alive()
+    assert capfd.readouterr() == ("", "")
