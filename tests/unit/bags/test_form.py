@@ -220,10 +220,11 @@ def test_we_read_what_rosbag2_and_users_make_of_it(
 
 
 _ENDED = """
-import os, sys
+import os, signal, sys
 from pathlib import Path
 from composer.bags.reader import open_bag
 from composer.cli.support.bags import bag_errors
+signal.signal(int(sys.argv[2]), signal.SIG_DFL)  # which these tests may have been started to ignore
 with bag_errors():
     bag = open_bag(Path(sys.argv[1]))
     os.kill(os.getpid(), int(sys.argv[2]))
