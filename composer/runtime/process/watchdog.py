@@ -35,6 +35,7 @@ _INTERVAL_S = 0.25
 _STACKS_WITHIN_S = 2.0
 _PACKET_BYTES = 65_536
 _STOPPED = b"Tt"
+_ThreadTimes = dict[str, tuple[float, float]]
 
 
 @contextmanager
@@ -98,33 +99,59 @@ def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:
     poll.register(wakeup, select.POLLIN)
     poll.register(descriptor, select.POLLIN)
     while os.getppid() == process:
+        late_s = _late_s()
         poll.poll()
         time.sleep(_SAME_REQUEST_S)
-        number = _unhandled(wakeup, process, limit_s)
+        # While this process had no processor, a second request may have arrived.
+        is_late = _late_s() - late_s > _SAME_REQUEST_S / 2
+        number = _unhandled(wakeup, process, limit_s, 1 if is_late else len(_unread(wakeup)))
         if number is not None:
             _end(descriptor, signal.Signals(number).name)
             return
         time.sleep(_INTERVAL_S)
 
 
-def _unhandled(wakeup: socket.socket, process: int, limit_s: float) -> int | None:
-    """Return the signal that is not handled within the limit; None if there is none any more."""
-    first = signals = _unread(wakeup)
+def _late_s() -> float:
+    """Return how long this process has waited for a processor so far."""
+    return sum(late_s for _, late_s in _thread_times_s(os.getpid()).values())
+
+
+def _unhandled(wakeup: socket.socket, process: int, limit_s: float, first: int) -> int | None:
+    """Return the signal that is not handled within the limit; None if there is none any more.
+
+    The first request consists of ``first`` signals; more of them are a second one.
+    """
+    signals = _unread(wakeup)
     waited_s = ran_s = 0.0
-    seen_s, delays_s = time.monotonic(), _delays_s(process)
+    seen_s, times_s = time.monotonic(), _thread_times_s(process)
     while signals and not _is_stopped(process):
         time.sleep(_INTERVAL_S)
-        now_s, now_delays_s = time.monotonic(), _delays_s(process)
+        now_s, now_times_s = time.monotonic(), _thread_times_s(process)
         passed_s = min(now_s - seen_s, 2 * _INTERVAL_S)  # the computer may have slept
-        late_s = (delay_s - delays_s.get(task, delay_s) for task, delay_s in now_delays_s.items())
         waited_s += passed_s
-        ran_s += max(0.0, passed_s - max(late_s, default=0.0))
-        seen_s, delays_s = now_s, now_delays_s
+        ran_s += _progress_s(passed_s, times_s, now_times_s)
+        seen_s, times_s = now_s, now_times_s
         signals = _unread(wakeup)
-        is_urgent = len(signals) > len(first) and ran_s > _URGENT_S
+        is_urgent = len(signals) > first and ran_s > _URGENT_S
         if signals and (waited_s > limit_s or is_urgent):
             return signals[0]
     return None
+
+
+def _progress_s(passed_s: float, before: _ThreadTimes, after: _ThreadTimes) -> float:
+    """Return the time in which no thread waited for a processor, or a thread ran: the longer one.
+
+    While one thread runs for a second, others that run Python have a second as well, or C code
+    keeps the lock.
+    """
+    changes = [
+        (ran_s - before[task][0], late_s - before[task][1])
+        for task, (ran_s, late_s) in after.items()
+        if task in before
+    ]
+    ran_s = max((ran_s for ran_s, _ in changes), default=0.0)
+    late_s = max((late_s for _, late_s in changes), default=0.0)
+    return max(ran_s, passed_s - late_s)
 
 
 def _unread(wakeup: socket.socket) -> list[int]:
@@ -141,14 +168,15 @@ def _is_stopped(process: int) -> bool:
     return content.rpartition(b") ")[2][:1] in _STOPPED
 
 
-def _delays_s(process: int) -> dict[str, float]:
-    """Return for each thread how long it was ready to run and had no processor."""
-    delays_s = {}
+def _thread_times_s(process: int) -> _ThreadTimes:
+    """Return how long each thread ran, and how long it was ready to run and had no processor."""
+    times_s = {}
     with suppress(OSError):
         for task in os.scandir(f"/proc/{process}/task"):
             words = _read(f"{task.path}/schedstat").split()
-            delays_s[task.name] = int(words[1]) / 1e9 if words else 0.0
-    return delays_s
+            if words:
+                times_s[task.name] = int(words[0]) / 1e9, int(words[1]) / 1e9
+    return times_s
 
 
 def _read(path: str) -> bytes:

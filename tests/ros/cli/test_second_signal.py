@@ -82,6 +82,20 @@ def wait_until_full(process: subprocess.Popen[str]) -> None:
         time.sleep(0.05)  # poll: nothing announces it
 
 
+def wait_until_delivered(pid: int, number: signal.Signals) -> None:
+    """Wait until a signal is not pending any more: a second one would be merged with it."""
+    end_s = time.monotonic() + PATIENCE_S
+    while _pending(pid) & (1 << (number - 1)):
+        assert time.monotonic() < end_s
+        time.sleep(0.05)  # poll: nothing announces it
+
+
+def _pending(pid: int) -> int:
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    [mask] = (line.split()[1] for line in lines if line.startswith("ShdPnd:"))
+    return int(mask, 16)
+
+
 def end(process: subprocess.Popen[str]) -> str:
     """Send two signals; check that the process ends at once, and return its errors."""
     process.send_signal(signal.SIGINT)
@@ -143,6 +157,7 @@ def test_a_regular_expression_that_never_ends(tmp_path: Path, signals: int, grac
             time.sleep(0.05)
         for _ in range(signals):
             system.process.send_signal(signal.SIGINT)
+            wait_until_delivered(system.process.pid, signal.SIGINT)
             time.sleep(PAUSE_S)
         code = system.process.wait(timeout=PATIENCE_S)
     assert code == -signal.SIGABRT

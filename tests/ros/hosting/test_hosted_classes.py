@@ -23,7 +23,7 @@ nodes:
   talker:
     class: {CLASSES}:Talker
     publishers: {{numbers: {{type: std_msgs/msg/Int64}}}}
-    parameters: {{period: {{type: double, default: 0.05}}}}  # a queue holds ten messages
+    parameters: {{period: {{type: double, default: 0.2}}}}  # a queue holds ten messages
     lifecycle: {{depends_on: [listener]}}
   listener:
     class: {CLASSES}:Listener

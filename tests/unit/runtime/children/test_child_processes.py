@@ -29,7 +29,8 @@ MARK = "COMPOSER_TEST_MARK"
 #: A composer with three children: a polite one, one that ignores everything but SIGKILL, and one
 #: with a grandchild that has left the process group.
 COMPOSER = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which these tests may have been started to ignore
 from composer.runtime.children.child_processes import ChildProcesses, Command
 children = ChildProcesses()
 mark = {MARK: sys.argv[1]}
