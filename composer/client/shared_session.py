@@ -32,7 +32,7 @@ class SharedSession(Session):
     """A session with threads of its own: any number of threads may wait at the same time.
 
     An executor of rclpy serves clients and subscriptions. It takes most of a millisecond for each
-    event, so frequent messages do without: those of :meth:`sample` are taken by the caller, and
+    event, so frequent messages do without: the caller takes the messages of :meth:`sample`, and
     what arrives in between costs no Python at all. ``changes`` counts the changes of the graph.
     """
 

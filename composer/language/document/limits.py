@@ -40,7 +40,7 @@ MAX_INCLUDED_VALUES = 200_000
 #: Keys and values that the nodes of a system declare; each node counts its node type again.
 MAX_DECLARED_VALUES = 400_000
 
-#: Sections of parameter files that nodes get; a program gets those of all its files.
+#: Sections of parameter files that nodes get; a program gets the sections of all its files.
 MAX_PASSED_SECTIONS = 1_000_000
 
 #: Node names that the patterns of a system stand for.

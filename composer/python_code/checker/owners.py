@@ -93,7 +93,7 @@ class Owners:
         return found if whole is None else parts(whole).get(part.lower())
 
     def _used_packages(self, module: Module) -> set[str]:
-        """Return the packages that the module imports, and those of the types of ports."""
+        """Return the packages that the module imports or that types of ports belong to."""
         ports = (port for node in self._behaviors.values() for port in node.ports)
         imported = {item.module.partition(".")[0] for item in module.imports.values()}
         return imported | {_package(port.interface.value) for port in ports}

@@ -65,8 +65,7 @@ class InstanceExecutor:
             result = function()
             outcome.set_result(await result if isinstance(result, Coroutine) else result)
         except BaseException as error:
-            outcome.set_exception(error)
-            outcome.exception()  # rclpy prints those that are never retrieved
+            fail(outcome, error)
             self._context.on_exception(function.__name__, error)
 
     def spin_until_future_complete(self, future: Awaited, timeout_sec: float | None = None) -> None:
@@ -85,3 +84,9 @@ class InstanceExecutor:
 
     def remove_node(self, node: object) -> None:
         """Do nothing: the node is served until it is cleaned up."""
+
+
+def fail(future: RclpyFuture, error: BaseException) -> None:
+    """Fail a future. rclpy prints exceptions that are never retrieved, but not this one."""
+    future.set_exception(error)
+    future.exception()

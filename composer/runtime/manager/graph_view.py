@@ -117,7 +117,7 @@ class GraphObserver:
     def details(self, kind: str, name: str) -> DetailsAnswer | None:
         """Return a node, topic or action; None if there is no such one, or as for `view`.
 
-        `nodes` has just returned the node that is asked for, so the view need not be complete.
+        `nodes` has just returned the node that is asked for, so the view may be incomplete.
         """
         types: tuple[str, ...] | None = ()
         if kind != "node":

@@ -18,7 +18,7 @@ from composer.runtime.protocol.codec import decode, encode
 
 @dataclass(frozen=True, slots=True)
 class SystemGoals:
-    """The goals of nodes by their full names. ``activity`` is that of the system: "paused"."""
+    """The goals of nodes by their full names. ``activity`` is what the system does: "paused"."""
 
     activity: str
     goals: Mapping[str, PrimaryState]

@@ -150,7 +150,7 @@ class SystemReport:
     ``number`` counts the reports of the process. ``is_child`` is whether the coordinating process
     of the system has started this one. ``participant`` is the prefix of the ids of the endpoints of
     the process, in hexadecimal digits. ``callbacks`` and ``chains`` are included on request, with
-    their time ``callbacks_at_s``. Clients add those of other processes, with their times
+    their time ``callbacks_at_s``. Clients add the timings of other processes, with their times
     ``processes_at_s``.
     """
 

@@ -18,6 +18,7 @@ from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.sources import complete_request
+from composer.runtime.hosting.executor import fail
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import UserFunction
 from composer.runtime.intra_process.servers import LocalService
@@ -170,12 +171,6 @@ def hosted_future(instance: Instance, error: BaseException) -> HostedFuture:
     future._instance = instance
     fail(future, error)
     return future
-
-
-def fail(future: RclpyFuture, error: BaseException) -> None:
-    """Fail a future. rclpy prints exceptions that are never retrieved, but not this one."""
-    future.set_exception(error)
-    future.exception()
 
 
 class ClientPort(RunningPort):
