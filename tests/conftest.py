@@ -133,9 +133,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def _mix(items: list[pytest.Item]) -> None:
     """Spread the files that mostly wait evenly among those that mostly compute.
 
-    With xdist's --no-loadscope-reorder, the workers run both kinds at all times.
+    With xdist's --no-loadscope-reorder, the workers run both kinds at all times. Those with slow
+    tests come first: as the last one, such a file would run alone.
     """
-    files = sorted({item.path for item in items})
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    files = sorted({item.path for item in items}, key=lambda path: (path not in slow, path))
     waiting = [path for path in files if any(map(path.is_relative_to, WAITING_FILES))]
     computing = [path for path in files if path not in waiting]
     place = {

@@ -118,7 +118,7 @@ class SystemStart:
 
 
 #: The longest share of the time for the tear-down that one step may take.
-_STEP_SHARE = 0.6
+_STEP_SHARE = 0.7
 _URGENT_S = 0.2
 #: This many nodes can be destroyed one by one within half a second.
 _FEW_NODES = 20
