@@ -23,9 +23,9 @@ _CONDITIONS = ("for_each", "if", "unless")
 def build(name: str) -> str:
     """Return the text of a schema."""
     schema = _read(name)
-    definitions = {**_read("shared"), **schema.pop("definitions")}
+    definitions = _joined(_read("shared"), schema.pop("definitions"))
     if name == "scenario":  # it overrides entries of a system
-        definitions = {**_read("system")["definitions"], **definitions}
+        definitions = _joined(_read("system")["definitions"], definitions)
         _add_keys(definitions["expectation"], definitions["condition"])
     if "executor" in definitions:
         definitions["overridden_executor"] = _unconditional(definitions["executor"])
@@ -45,6 +45,14 @@ def _read(part: str) -> dict[str, Any]:
         raise SystemExit("\n".join(f"{item.primary}: {item.message}" for item in diagnostics))
     content: dict[str, Any] = plain(tree)
     return content
+
+
+def _joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """Return the definitions of both, which must not define the same name."""
+    twice = sorted(first.keys() & second.keys())
+    if twice:
+        raise SystemExit(f"defined twice in {FOLDER / 'parts'}: {', '.join(twice)}")
+    return {**first, **second}
 
 
 def _unconditional(part: dict[str, Any]) -> dict[str, Any]:

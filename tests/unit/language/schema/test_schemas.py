@@ -51,6 +51,11 @@ def test_is_made_from_its_parts(name: str) -> None:
     assert build["path"](name).read_text() == made, "run 'python schemas/build.py'"
 
 
+def test_a_definition_means_the_same_in_every_schema() -> None:
+    node, system = (schema(name)["definitions"] for name in ("node", "system"))
+    assert [name for name in node if name in system and node[name] != system[name]] == []
+
+
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_every_keyword_has_its_words(name: str) -> None:
     used = {keyword for part in parts_of(schema(name)) for keyword in part}
