@@ -250,7 +250,7 @@ def _rendered(section: Section, document: Schema, details: Details) -> str:
         lines += ["", *details.lines(section.heading, texts)]
     alternatives = [choice["required"] for choice in section.part.get("anyOf", ())]
     if alternatives:
-        names = " and ".join(f"`{name}`" for choice in alternatives for name in choice)
+        names = _either([f"`{name}`" for choice in alternatives for name in choice])
         lines += ["", f"At least one of {names} is required."]
     return "\n".join([*lines, ""])
 
@@ -262,7 +262,7 @@ def _row(key: str, part: Part, what: str, section: Section, document: Schema) ->
     elif key in section.declared:
         what = f"**Required** unless set by a node type. {what}"
     kind = document.kind(part, f"#{key}")
-    if "default" in described:
+    if "default" in described and key not in section.required:
         kind += f"; default: `{_flow(described['default'])}`"
     example = f"`{_flow(described['examples'][0])}`" if described.get("examples") else ""
     cells = [f"`{key}`", what, kind, example]

@@ -105,7 +105,7 @@ class ChannelKind(StrEnum):
 class Delivery(StrEnum):
     """How messages are delivered between ports of the process."""
 
-    AUTO = "auto"  # directly in the process, and by DDS to external nodes
+    AUTO = "auto"  # directly in the process, and by DDS to other processes
     DDS = "dds"  # by DDS only
 
 
@@ -234,7 +234,7 @@ class Port:
     budget_ms: Located[float] | None = None  # maximum duration of its callback
     reentrant: bool = False
     always_on: bool = False  # also active while its node is inactive
-    external: bool = False  # connected to external nodes
+    external: bool = False  # its other end is outside the system
     delivery: Delivery | None = None  # set by its connection; None: the system's
     isolation: Isolation = Isolation.SHARE
     required: bool | None = None  # whether another endpoint must exist; None: not set

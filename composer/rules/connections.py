@@ -100,12 +100,12 @@ def _port_label(endpoint: PortOfNode) -> Label:
 
 
 def external_hint(endpoint: PortOfNode) -> str:
-    """Return the hint for a port whose counterpart is an external node."""
+    """Return the hint for a port whose other end is outside the system."""
     port = endpoint.port
     key = "external: true"
     if port.name.span.file != endpoint.node.span.file:
         key = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
-    return f"set '{key}' if an external node does"
+    return f"set '{key}' if a node outside the system does"
 
 
 def _is_fully_known(context: Context) -> bool:

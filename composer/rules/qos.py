@@ -298,7 +298,8 @@ def check_unreliable_state(context: Context) -> Iterator[Diagnostic]:
                     UNSUITED_QOS,
                     "with 'best_effort', late joiners get nothing in spite of 'transient_local'",
                     qos.policy_span("reliability"),
-                    hint="use 'reliable' or 'volatile', unless an external node requires both",
+                    hint="use 'reliable' or 'volatile', "
+                    "unless a node outside the system requires both",
                 )
 
 

@@ -211,7 +211,7 @@ def rates(context: Context) -> Rates:
         and channel.sources
         and not any(
             endpoint.port.external for endpoint in channel.sinks
-        )  # external nodes publish there, too
+        )  # nodes outside the system publish there, too
     }
     topics: dict[str, float | None] = {}
     for name in _in_order_of_cause(known, publishers):

@@ -144,7 +144,7 @@ class VirtualPoller:
     """Waits for wake-ups and points in virtual time.
 
     No entity becomes ready in an isolated system, because all messages stay in the process. In
-    others, entities are ready at any time, as external nodes like.
+    others, entities are ready at any time, as nodes in other processes like.
     """
 
     def __init__(self, clock: VirtualClock) -> None:

@@ -114,7 +114,7 @@ class GatedPublisher:
         self.count += 1
 
     def _check_external(self) -> None:
-        """Check for external subscriptions: first, and after each change of matches."""
+        """Check for subscriptions in other processes: first, and after each change of matches."""
         self._generation = MATCHING.generation
 
     def _converted(self, message: Any) -> Any:

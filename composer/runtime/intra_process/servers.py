@@ -1,6 +1,6 @@
 """Services and action servers as clients of the same process see them.
 
-Goals are goals of rclpy's server like any other: external nodes see their status, receive their
+Goals are goals of rclpy's server like any other: other processes see their status, receive their
 feedback and may cancel them. Only what the client itself receives bypasses DDS.
 """
 

@@ -166,7 +166,7 @@ class LatchingPublisher(LocalPublisher):
         latched = CopyingTarget(self._latched) if self._isolated else self._latched
         self._observers = (*context.observers, latched)
         self._target = combined(self._observers)
-        self._has_external = True  # an external subscription that joins later needs the messages
+        self._has_external = True  # a subscription of another process that joins later needs them
         self._lock = threading.Lock()  # a joining subscription gets each message once
 
     def publish(self, message: Any) -> None:
