@@ -51,10 +51,7 @@ _KEYS: dict[str, frozenset[str]] = {
     ExpectationKind.LATENCY: frozenset({"at_most_ms"}),
     ExpectationKind.END_STATE: frozenset(),
 }
-#: What a step or an expectation needs in the system: the end of a channel.
-_SINKS = frozenset(
-    {Verb.PUBLISH, Verb.DROP, Verb.DELAY, Verb.DUPLICATE, Verb.REORDER, Verb.CORRUPT}
-)
+#: What the system lacks if no node provides a channel that a step or an expectation names.
 _LACKS = {
     ChannelKind.TOPIC: "no node publishes",
     ChannelKind.SERVICE: "no node serves",
@@ -144,7 +141,7 @@ def check_names(context: Context) -> Iterator[Diagnostic]:
         if action.verb.channel is None:
             yield from _unknown_node(context, action.name, action.node)
         else:
-            is_sink = action.verb in _SINKS
+            is_sink = action.verb.channel is ChannelKind.TOPIC
             yield from _unknown_channel(context, action.verb.channel, action.name, is_sink=is_sink)
     for event in scenario.conditions:
         if event.kind.channel is not None:

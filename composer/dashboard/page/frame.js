@@ -5,7 +5,8 @@ import { duration, usage } from "./format.js";
 import { icon } from "./icons.js";
 import { attempt, confirmed, toast } from "./widgets/notices.js";
 
-const VIEWS = [
+/** The views, in the order of the keys 1 to 9: name, label, and a short label for phones. */
+export const VIEWS = [
   ["graph", "Graph", "Graph"],
   ["nodes", "Nodes", "Nodes"],
   ["topics", "Topics", "Topics"],

@@ -2,22 +2,12 @@
 import { createConnection } from "./connection.js";
 import { h } from "./dom.js";
 import { keepFocus } from "./focus.js";
-import { createFrame } from "./frame.js";
+import { createFrame, VIEWS } from "./frame.js";
 import { takeKey } from "./key.js";
 import { createRouter } from "./router.js";
 
-/** View -> its module, loaded when it is first shown; actions are in the view of services. */
-const VIEWS = {
-  graph: () => import("./views/graph.js"),
-  nodes: () => import("./views/nodes.js"),
-  topics: () => import("./views/topics.js"),
-  services: () => import("./views/services.js"),
-  actions: () => import("./views/services.js"),
-  parameters: () => import("./views/parameters.js"),
-  log: () => import("./views/log.js"),
-  timing: () => import("./views/timing.js"),
-  bags: () => import("./views/bags.js"),
-};
+/** Addresses that the view of another name shows. */
+const SHARED = { actions: "services" };
 /** How long a page may be hidden before it stops receiving. */
 const HIDDEN_MS = 3000;
 /** How long after the page the other views are loaded. */
@@ -48,18 +38,18 @@ function main() {
 
   async function show(route) {
     wanted = route;
-    const load = VIEWS[route.view];
-    if (!load) {
+    const view = SHARED[route.view] ?? route.view;
+    if (!VIEWS.some(([id]) => id === view)) {
       leave();
       place.replaceChildren(h("p", { class: "empty" }, `There is no view '${route.view}'.`));
       place.removeAttribute("aria-busy");
       return;
     }
-    frame.showView(route.view === "actions" ? "services" : route.view, route.name);
+    frame.showView(view, route.name);
     // The view before stays until the module of the next one is loaded.
     place.setAttribute("aria-busy", "true");
     try {
-      const module = await load();
+      const module = await load(view);
       if (route === wanted) display(module, route);
     } finally {
       if (route === wanted) place.removeAttribute("aria-busy");
@@ -93,9 +83,14 @@ function main() {
   addEventListener("load", () => setTimeout(loadOthers, LOAD_OTHERS_MS));
 }
 
+/** A view has the name of its module, which is loaded when it is first shown. */
+function load(view) {
+  return import(`./views/${view}.js`);
+}
+
 /** Other views are then shown at once. */
 function loadOthers() {
-  for (const load of Object.values(VIEWS)) load().catch(() => {});
+  for (const [view] of VIEWS) load(view).catch(() => {});
 }
 
 main();

@@ -37,7 +37,7 @@ AsgiSend = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 _TRY_AGAIN_LATER = 1013
 _METHODS = ("GET", "HEAD")
 #: The addresses of the views; the page reads the rest of the path.
-_VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing", "bags")
+VIEWS = ("graph", "nodes", "topics", "services", "actions", "parameters", "log", "timing", "bags")
 #: The page shares a folder with Python code.
 _SUFFIXES = (".css", ".html", ".js", ".svg", ".txt", "LICENSE")
 _MAX_PATH = 200
@@ -101,8 +101,8 @@ def make_app(dashboard: Dashboard) -> AccessCheck:
 
     routes = [
         Route("/", index),
-        *(Route(f"/{view}", index) for view in _VIEWS),
-        *(Route(f"/{view}/{{rest:path}}", index) for view in _VIEWS),
+        *(Route(f"/{view}", index) for view in VIEWS),
+        *(Route(f"/{view}/{{rest:path}}", index) for view in VIEWS),
         Route("/page/{path:path}", _file),
         Route("/style.css", _style),
         WebSocketRoute("/ws", page),

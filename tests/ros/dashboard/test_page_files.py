@@ -6,24 +6,12 @@ import re
 
 import pytest
 
-from composer.dashboard.web.app import file_of_page, index_of
+from composer.dashboard.web.app import VIEWS, file_of_page, index_of
 
-VIEWS = (
-    "",
-    "graph",
-    "nodes",
-    "topics",
-    "services",
-    "actions",
-    "parameters",
-    "log",
-    "timing",
-    "bags",
-)
 _LINK = re.compile(r'<link rel="modulepreload" href="/page/([^"]+)">')
 
 
-@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("view", ["", *VIEWS])
 def test_every_view_names_its_modules(view: str) -> None:
     modules = _LINK.findall(index_of(view).decode())
     assert len(set(modules)) == len(modules)
