@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -47,8 +48,18 @@ def test_every_help_page_ends_with_examples_of_the_command(command: list[str]) -
     assert "--help" in options
     shown = [line.strip() for line in lines.strip().splitlines()]
     assert shown
-    words = " ".join(["compose", *command]).replace("send_goal", "send-goal")
+    words = " ".join(["compose", *command])
     assert all(words in line for line in shown)
+
+
+@pytest.mark.parametrize("command", ["run", "graph"])
+def test_examples_set_arguments_that_their_systems_have(command: str) -> None:
+    page = compose(command, "--help").out
+    examples = re.findall(rf"compose {command} (\w+)((?: \w+=\w+)+)", page)
+    assert examples
+    for system, arguments in examples:
+        done = compose("config", system, *arguments.split())
+        assert done.code == 0, done.err
 
 
 @pytest.mark.parametrize("group", GROUPS, ids=str)

@@ -91,7 +91,7 @@ def _check(source: BehaviorSource, text: str, folder: Path) -> None:
         raise ClassNotFound(
             f"no Python module named '{module}'",
             nearby_modules(module, (folder, *Project.at(folder).node_folders)).hint
-            or "it is searched for in this folder, among the node types, and on Python's path",
+            or "Python looks for it in this folder, in the folders of node types, and on its path",
         )
     if not source.class_found:
         raise ClassNotFound(

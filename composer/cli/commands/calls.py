@@ -103,6 +103,14 @@ def action_info(
     write(lines(shown))
 
 
+@action_app.command(
+    "send-goal",
+    epilog=examples(
+        "compose action send-goal /navigate '{target: {x: 2.0}, max_velocity: 1.0}' --feedback",
+        "compose action send-goal /navigate composer_interfaces/action/Navigate"
+        " '{max_velocity: 1.0}'",
+    ),
+)
 def send_goal(
     action: Action,
     values: Annotated[
@@ -162,14 +170,6 @@ def send_goal(
         _print({"result": to_plain(finished.result), "status": finished.status}, json=json)
     if finished.status != "succeeded":
         raise typer.Exit(FAILED)
-
-
-_EPILOG = examples(
-    "compose action send-goal /navigate '{target: {x: 2.0}, max_velocity: 1.0}' --feedback",
-    "compose action send-goal /navigate composer_interfaces/action/Navigate '{max_velocity: 1.0}'",
-)
-action_app.command("send-goal", epilog=_EPILOG)(send_goal)
-action_app.command("send_goal", epilog=_EPILOG, hidden=True)(send_goal)  # as ros2 spells it
 
 
 @contextmanager

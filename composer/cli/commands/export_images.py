@@ -58,7 +58,7 @@ Image = Annotated[
         metavar="NAME",
         callback=_image_name,
         help="The name of the image, as in registry.local/robot:1.2.",
-        show_default="that of the system",
+        show_default="the name of the system",
     ),
 ]
 

@@ -27,9 +27,9 @@ EPILOG = examples(
     "compose graph pipeline -o pipeline.html               write an interactive page",
     "compose graph pipeline -o pipeline.svg                write an image",
     "compose graph pipeline --view lifecycle -o order.png  draw the bring-up order",
-    "compose graph frames --view frames -o frames.svg       draw the frames of tf2",
-    "compose graph pipeline robot -o both.svg               draw several systems together",
-    "compose graph fleet robots=3 -o fleet.svg              draw it with these arguments",
+    "compose graph frames --view frames -o frames.svg      draw the frames of tf2",
+    "compose graph pipeline robot -o both.svg              draw several systems together",
+    "compose graph configurable cameras=3 -o three.svg     draw it with these arguments",
     "compose graph --live -o now.html                      draw the running ROS graph",
 )
 

@@ -135,8 +135,8 @@ def import_class(
     actions and parameters that the class creates with literal names, and lists what only a running
     node would show.
 
-    The module is searched for in this folder, among the node types of the project, and on
-    Python's module search path.
+    Python looks for the module in this folder, in the folders of node types, and on its module
+    search path.
     """
     from composer.bridges.importing.python_class import ClassNotFound, describe_class
     from composer.bridges.importing.writing import write_node_type

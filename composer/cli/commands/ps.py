@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 EPILOG = examples(
-    "compose ps                 all running systems and other lifecycle nodes",
-    "compose ps pipeline        a single system",
-    "compose ps --json          print JSON",
+    "compose ps                     all running systems and other lifecycle nodes",
+    "compose ps pipeline            a single system",
     "compose ps pipeline --ready    check that all of its nodes are up, as containers do",
+    "compose ps --json              print JSON",
 )
 
 #: None stands for a system that did not respond.
@@ -50,7 +50,7 @@ def ps(
     """List running systems and their nodes.
 
     For each node, the list has the state and its duration, the number of restarts and errors, the
-    message rates of the last seconds (- if they are not known), and the last error. A system is
+    message rates of the last seconds (- if unknown), and the last error. A system is
     listed with the nodes of all its processes. Other lifecycle nodes are listed with their states,
     as are the nodes of a system that another version of ros2-composer runs. With --json, the output
     includes callback timings, which 'compose top' shows as a table.

@@ -33,7 +33,7 @@ EPILOG = examples(
     "compose test -k 'docking and not slow'        run those with such names",
     "compose test --repeat 50 -j 4                 run each 50 times, four side by side",
     "compose test --explore 200 scenarios/dock.yaml  look for timing that makes it fail",
-    "compose test --real-time                      with the time of the computer",
+    "compose test --real-time                      run in real time",
     "compose test --junit build/scenarios.xml      write the results for CI",
     "compose test --bag-on-failure                 keep what failed runs have published",
 )
@@ -53,9 +53,7 @@ def test(
         ),
     ] = None,
     *,
-    real_time: Annotated[
-        bool, typer.Option("--real-time", help="Run in the time of the computer.")
-    ] = False,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Run in real time.")] = False,
     seed: Annotated[
         int | None,
         typer.Option("--seed", metavar="N", help="The seed of random numbers, for all scenarios."),
@@ -106,7 +104,7 @@ def test(
     ] = False,
     timeout: Annotated[
         float,
-        quantity("SECONDS", "--timeout", help="Maximum time of the computer for a run."),
+        quantity("SECONDS", "--timeout", help="Maximum real time of a run."),
     ] = 120.0,
 ) -> None:
     """Run scenarios, which say what systems must do.

@@ -65,7 +65,7 @@ def validate(
         list[str] | None,
         typer.Argument(
             metavar="[PATH]... [NAME=VALUE]...",
-            help="Files, folders to search for systems and node types, or - for stdin, and"
+            help="Files, folders to search for files, or - for stdin, and"
             " arguments of the systems. Default: the current folder.",
             autocompletion=complete_system_or_argument,
         ),
@@ -113,15 +113,15 @@ def validate(
         ),
     ] = None,
 ) -> None:
-    """Check systems and node types.
+    """Check systems, node types and scenarios.
 
     Nothing is started, and ROS is not needed. All combinations of arguments are checked. An
     argument given as NAME=VALUE is checked with this value only. Settings of a project are in its
     composer.yaml: strict, select, ignore, severity, nodes and interfaces.
 
-    The formats json, sarif and github always have all diagnostics.
+    The formats json, sarif and github contain all diagnostics.
 
-    Exit code 1 if there are errors, or warnings with --strict, also if they are not shown.
+    Exit code 1 if there are errors, or warnings with --strict, even if they are not shown.
     """
     if explain is not None:
         _explain(explain)

@@ -110,7 +110,7 @@ AutostartTo = Annotated[
     Autostart | None,
     typer.Option(
         "--autostart",
-        help="Bring nodes up to this state.",
+        help="The state to which the nodes are brought up.",
         show_default="as declared in the system",
     ),
 ]

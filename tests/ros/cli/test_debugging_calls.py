@@ -77,7 +77,7 @@ def test_feedback_that_arrives_with_the_result_is_printed() -> None:
 
 
 def test_a_rejected_goal_is_reported() -> None:
-    goal = ("action", "send_goal", "/lab/navigate", "composer_interfaces/action/Navigate", "{}")
+    goal = ("action", "send-goal", "/lab/navigate", "composer_interfaces/action/Navigate", "{}")
     expect_error("'/lab/navigate' rejected the goal", *goal)
 
 
