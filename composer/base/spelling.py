@@ -22,6 +22,7 @@ LONGEST_NAME = 255
 
 _FEW = 60
 _NEIGHBORS = 12  # number of candidates on each side, of many names
+_MAX_MEANT = 3  # similar names that one may be a typo of
 #: Letters of all candidates, of which there are at least two.
 _MAX_LETTERS = 2400
 #: Pairs of equal letters of a name and its candidates. Comparing takes time for each.
@@ -99,7 +100,7 @@ class Vocabulary:
         if len(name) > LONGEST_NAME:
             return []
         folded = name.casefold()
-        alike = nlargest(count, _ratios(folded, self._candidates(folded)))
+        alike = _most_similar(folded, self._candidates(folded), count)
         return [self._by_folded[match] for _, match in alike]
 
     def _candidates(self, folded: str) -> list[str]:
@@ -120,13 +121,23 @@ def vocabulary(names: tuple[str, ...]) -> Vocabulary:
     return Vocabulary(names)
 
 
+def misspelled(name: str, names: tuple[str, ...]) -> str | None:
+    """Return the one of ``names`` that ``name`` differs from by a typo; None if there is none."""
+    close = vocabulary(names).close(name, _MAX_MEANT)
+    return next((other for other in close if is_typo(name, other)), None)
+
+
 def _neighbors(name: str, ordered: Sequence[str], side: int) -> list[str]:
     place = bisect_left(ordered, name)
     return list(ordered[max(place - side, 0) : place + side])
 
 
-def _ratios(name: str, candidates: Iterable[str]) -> list[tuple[float, str]]:
-    """Return the similarities of names like ``name``: first of those with its letters."""
+def _most_similar(name: str, candidates: Iterable[str], count: int) -> list[tuple[float, str]]:
+    """Return up to ``count`` names like ``name`` with their similarities, most similar first.
+
+    The letters of a candidate limit its similarity, and are compared first: where that limit is
+    below the similarities found so far, the order of its letters cannot matter.
+    """
     matcher = SequenceMatcher(autojunk=False)
     matcher.set_seq2(name)
     likely: list[tuple[float, str]] = []
@@ -135,11 +146,14 @@ def _ratios(name: str, candidates: Iterable[str]) -> list[tuple[float, str]]:
         if matcher.real_quick_ratio() >= LEAST_LIKENESS:
             likely.append((matcher.quick_ratio(), candidate))
     letters, pairs = Counter(name), 0
-    ratios: list[tuple[float, str]] = []
-    for quick, candidate in sorted(likely, reverse=True):
+    best: list[tuple[float, str]] = []
+    for limit, candidate in sorted(likely, reverse=True):
         pairs += sum(map(letters.__getitem__, candidate))
-        if quick < LEAST_LIKENESS or pairs > _MAX_PAIRS:
+        least = best[-1][0] if len(best) == count else LEAST_LIKENESS
+        if limit < least or pairs > _MAX_PAIRS:
             break
         matcher.set_seq1(candidate)
-        ratios.append((matcher.ratio(), candidate))
-    return [found for found in ratios if found[0] >= LEAST_LIKENESS]
+        ratio = matcher.ratio()
+        if ratio >= LEAST_LIKENESS:
+            best = nlargest(count, [*best, (ratio, candidate)])
+    return best

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from enum import StrEnum
 from pathlib import Path
@@ -252,10 +252,20 @@ class Node:
     unknown: tuple[UnknownKey, ...] = ()
     given: tuple[Located[str], ...] = field(default=(), compare=False)  # the keys of its entry
     complete: bool = True  # False: its type is unknown or invalid
+    #: The initial values of the parameters that have one, by name.
+    initial_parameters: Mapping[str, object] = field(init=False, repr=False, compare=False)
     _ports: dict[str, Port] = field(init=False, repr=False, compare=False)
+    _parameters: dict[str, Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        values = {
+            parameter.name.value: parameter.value.value
+            for parameter in self.parameters
+            if parameter.value is not None
+        }
+        object.__setattr__(self, "initial_parameters", values)
         object.__setattr__(self, "_ports", by_name(self.ports))
+        object.__setattr__(self, "_parameters", by_name(self.parameters))
 
     @property
     def ros_name(self) -> Located[str]:
@@ -312,15 +322,6 @@ class Node:
         """Return the ports of the given kinds, in order."""
         return tuple(port for port in self.ports if port.kind in kinds)
 
-    @property
-    def initial_parameters(self) -> dict[str, object]:
-        """The initial values of the parameters that have one, by name."""
-        return {
-            parameter.name.value: parameter.value.value
-            for parameter in self.parameters
-            if parameter.value is not None
-        }
-
     def period_s(self, timer: Timer) -> float | None:
         """Return a timer's period with the initial parameters; None if it has no valid one."""
         try:
@@ -330,4 +331,4 @@ class Node:
 
     def parameter(self, name: str) -> Parameter | None:
         """Return the parameter called ``name``, or None."""
-        return next((item for item in self.parameters if item.name.value == name), None)
+        return self._parameters.get(name)

@@ -87,6 +87,25 @@ def strongest(profiles: Iterable[QosProfile]) -> tuple[Reliability, Durability]:
     )
 
 
+def strictest(requests: Sequence[QosProfile]) -> QosProfile:
+    """Return the profile that exactly the offers match which match each of the ``requests``."""
+    reliability, durability = strongest(requests)
+    deadlines_ms = [item.deadline_ms for item in requests if item.deadline_ms is not None]
+    leases_ms = [
+        item.liveliness_lease_duration_ms
+        for item in requests
+        if item.liveliness_lease_duration_ms is not None
+    ]
+    is_manual = any(item.liveliness is Liveliness.MANUAL_BY_TOPIC for item in requests)
+    return QosProfile(
+        reliability=reliability,
+        durability=durability,
+        deadline_ms=min(deadlines_ms, default=None),
+        liveliness=Liveliness.MANUAL_BY_TOPIC if is_manual else Liveliness.AUTOMATIC,
+        liveliness_lease_duration_ms=min(leases_ms, default=None),
+    )
+
+
 def strictest_compatible(offers: Sequence[QosProfile], depth: int) -> QosProfile:
     """Return the strictest profile of a subscription that is compatible with every offer."""
     reliable = all(offer.reliability is Reliability.RELIABLE for offer in offers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.machinery
 import importlib.util
 import io
+import os
 import sys
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
@@ -201,11 +202,12 @@ def _modules_in(folders: Iterable[Path]) -> Iterator[tuple[str, str]]:
     """Yield the names of the files and folders that may be modules, with their suffixes."""
     for folder in folders:
         with suppress(OSError, ValueError):
-            for item in folder.iterdir():
-                name, _, rest = item.name.partition(".")
-                is_module = item.suffix in (".py", ".pyi", *_COMPILED) or not rest
+            for entry in os.listdir(folder):  # noqa: PTH208 - it takes a tenth of Path.iterdir
+                name, _, rest = entry.partition(".")
+                suffix = f".{rest.rpartition('.')[2]}" if rest else ""
+                is_module = suffix in (".py", ".pyi", *_COMPILED) or not rest
                 if is_module and name.isidentifier():
-                    yield name, item.suffix
+                    yield name, suffix
 
 
 def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:

@@ -6,12 +6,20 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from composer.base.diagnostics import Diagnostic, Label, Severity, error, nearest
-from composer.base.spelling import is_typo
-from composer.model import USE_SIM_TIME, ChannelKind, Parameter, ParameterType, Port, PortKind
+from composer.base.spelling import misspelled
+from composer.model import (
+    USE_SIM_TIME,
+    Channel,
+    ChannelKind,
+    Parameter,
+    ParameterType,
+    Port,
+    PortKind,
+)
 from composer.model.qos import incompatibilities
 from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
 from composer.rules.analysis.class_ports import CreatedPort, all_created_ports, created_ports
-from composer.rules.analysis.context import Context, hosted_classes
+from composer.rules.analysis.context import Context, distinct_classes, hosted_classes
 from composer.rules.analysis.subjects import type_subject
 from composer.rules.python import as_warning
 
@@ -29,16 +37,25 @@ def check_interfaces(context: Context) -> Iterator[Diagnostic]:
     """Compare the ports and parameters of nodes with their classes."""
     for item in hosted_classes(context):
         if item.node.ports:
-            yield from _missing_ports(item)
+            yield from _missing_ports(item, context)
             yield from _different_ports(item, context)
         if item.node.parameters or item.node.undeclared_parameters:
             yield from _parameters(item)
 
 
-def _missing_ports(item: ClassOfNode) -> Iterator[Diagnostic]:
+def _created_ports(context: Context) -> dict[int, list[CreatedPort]]:
+    """Return what each class creates, by the identity of its source; nodes may share a class."""
+    return {id(item.source): list(created_ports(item)) for item in distinct_classes(context)}
+
+
+def _all_created_ports(context: Context) -> dict[int, list[CreatedPort] | None]:
+    return {id(item.source): all_created_ports(item) for item in distinct_classes(context)}
+
+
+def _missing_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic]:
     """Report the declared ports that are not among those that the class creates."""
     ports = [port for port in item.node.ports if port.kind in _KINDS]
-    created = all_created_ports(item) if ports else None
+    created = context.once(_all_created_ports)[id(item.source)]
     for port in ports if created is not None else ():
         names = [other.name or "" for other in created or () if other.kind is port.kind]
         declared = {_last(other.ros_name.value) for other in ports if other.kind is port.kind}
@@ -64,7 +81,7 @@ def _last(name: str) -> str:
 
 def _different_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic]:
     """Report the ports that the class creates with another type or QoS."""
-    created = list(created_ports(item))
+    created = context.once(_created_ports)[id(item.source)]
     for port in item.node.ports:
         same = [
             other
@@ -95,14 +112,10 @@ def _different_qos(
     if qos is None:
         return
     is_publisher = port.kind is PortKind.PUBLISHER
-    topics = (item for item in context.channels if item.kind is ChannelKind.TOPIC)
-    ends = [
-        end.port.qos.profile
-        for topic in topics
-        for end in (topic.sinks if is_publisher else topic.sources)
-        if topic.name == port.full_name
-    ]
-    pairs = [(qos, other) if is_publisher else (other, qos) for other in ends]
+    topic = context.once(_topics).get(port.full_name)
+    ends = () if topic is None else topic.sinks if is_publisher else topic.sources
+    profiles = [end.port.qos.profile for end in ends]
+    pairs = [(qos, other) if is_publisher else (other, qos) for other in profiles]
     is_problem = any(incompatibilities(*pair) for pair in pairs)
     rule = replace(CLASS_PORT, severity=Severity.WARNING if is_problem else Severity.INFO)
     for policy in _compared_policies(port, created):
@@ -112,6 +125,10 @@ def _different_qos(
             label = Label(created.span, "created here")
             yield Diagnostic(rule, message, port.qos.own_span(policy), (label,))
             return  # another profile, most likely
+
+
+def _topics(context: Context) -> dict[str, Channel]:
+    return {item.name: item for item in context.channels if item.kind is ChannelKind.TOPIC}
 
 
 def _compared_policies(port: Port, created: CreatedPort) -> list[str]:
@@ -155,7 +172,7 @@ def _undeclared(
     if name in names:
         return
     if item.node.parameter(name) is None:
-        close = next((other for other in names if is_typo(name, other)), None)
+        close = misspelled(name, names)
         is_reported = close is not None
     else:
         close = nearest(name, names)

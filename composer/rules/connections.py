@@ -249,6 +249,10 @@ def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
             )
 
 
+#: Names and patterns that ``recording`` lists and that are looked for; a file lists a few.
+_MAX_PATTERNS = 200
+
+
 def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
     """Check that nodes in the processes of the system send what ``recording`` names."""
     system = context.system
@@ -268,7 +272,7 @@ def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
         ("services", CLIENT_WITHOUT_SERVER, "provides or calls", names[ChannelKind.SERVICE]),
         ("actions", CLIENT_WITHOUT_SERVER, "provides", names[ChannelKind.ACTION]),
     ):
-        for pattern in recording.patterns[kind]:
+        for pattern in recording.patterns[kind][:_MAX_PATTERNS]:
             text = pattern.value
             if is_unresolved(text) or any(matches_wildcard(text, name) for name in known):
                 continue

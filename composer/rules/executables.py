@@ -46,7 +46,7 @@ def check_unknown_executable(context: Context) -> Iterator[Diagnostic]:
         if executable.command:
             yield from _command(executable)
         elif executable.package is not None and executable.name is not None:
-            yield from _executable_of_package(executable.package, executable.name)
+            yield from _executable_of_package(context, executable.package, executable.name)
         folder = _folder(executable)
         if folder is not None and not folder.is_dir() and executable.working_directory:
             written = executable.working_directory
@@ -72,10 +72,12 @@ def _command(executable: Executable) -> Iterator[Diagnostic]:
             )
 
 
-def _executable_of_package(package: Located[str], name: Located[str]) -> Iterator[Diagnostic]:
+def _executable_of_package(
+    context: Context, package: Located[str], name: Located[str]
+) -> Iterator[Diagnostic]:
     if is_unresolved(package.value) or is_unresolved(name.value):
         return
-    if not has_package(package.value, os.environ):
+    if not _is_installed(context, package.value):
         return  # see executable_not_installed.py
     if find_executable(package.value, name.value, os.environ) is None:
         yield Diagnostic(
@@ -84,6 +86,33 @@ def _executable_of_package(package: Located[str], name: Located[str]) -> Iterato
             name.span,
             hint=suggestion(name.value, executable_names(package.value, os.environ)),
         )
+
+
+def _has_ros(_: Context) -> bool:
+    return has_ros_packages(os.environ)
+
+
+def _is_installed(context: Context, package: str) -> bool:
+    """Return whether a package is installed; many nodes may name the same one."""
+    installed = context.once(_packages)
+    if package not in installed:
+        installed[package] = has_package(package, os.environ)
+    return installed[package]
+
+
+def _packages(_: Context) -> dict[str, bool]:
+    return {}
+
+
+def _is_in_path(context: Context, program: str) -> bool:
+    programs = context.once(_programs_in_path)
+    if program not in programs:
+        programs[program] = find_program(program, Path(), os.environ) is not None
+    return programs[program]
+
+
+def _programs_in_path(_: Context) -> dict[str, bool]:
+    return {}
 
 
 def _folder(executable: Executable) -> Path | None:
@@ -108,11 +137,11 @@ def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
         if executable.command:
             program = executable.command[0]
             is_path = "/" in program.value or is_unresolved(program.value)
-            if not is_path and find_program(program.value, executable.folder, os.environ) is None:
+            if not is_path and not _is_in_path(context, program.value):
                 yield Diagnostic(NOT_INSTALLED, f"program '{program}' is not in PATH", program.span)
-        elif package is None or is_unresolved(package.value) or not has_ros_packages(os.environ):
+        elif package is None or is_unresolved(package.value) or not context.once(_has_ros):
             continue
-        elif not has_package(package.value, os.environ):
+        elif not _is_installed(context, package.value):
             yield Diagnostic(NOT_INSTALLED, f"package '{package}' is not installed", package.span)
 
 
@@ -198,10 +227,10 @@ def check_component(context: Context) -> Iterator[Diagnostic]:
                     hint="write 'component: {package: ..., plugin: ...}'",
                 )
         if component.plugin is not None and not is_unresolved(component.plugin.value):
-            yield from _plugin(component, component.plugin)
+            yield from _plugin(context, component, component.plugin)
 
 
-def _plugin(component: Component, plugin: Located[str]) -> Iterator[Diagnostic]:
+def _plugin(context: Context, component: Component, plugin: Located[str]) -> Iterator[Diagnostic]:
     package = component.package
     if not _CLASS.fullmatch(plugin.value):
         better = plugin.value.strip().replace("/", "::")
@@ -220,7 +249,7 @@ def _plugin(component: Component, plugin: Located[str]) -> Iterator[Diagnostic]:
                 plugin.span,
                 hint=suggestion(plugin.value, plugins),
             )
-        elif has_ros_packages(os.environ) and not has_package(package.value, os.environ):
+        elif context.once(_has_ros) and not _is_installed(context, package.value):
             text = f"package '{package}' is not installed"
             yield Diagnostic(NOT_INSTALLED, text, package.span)
 

@@ -18,7 +18,7 @@ from composer.base.diagnostics import (
     warning,
 )
 from composer.base.source import Located, Span
-from composer.base.spelling import is_typo
+from composer.base.spelling import is_typo, misspelled
 from composer.model import ChannelKind, Node, Parameter, PortKind, UnmatchedParameters
 from composer.model.names import namespace_problem, split_node_name
 from composer.model.qos_overrides import PREFIX as QOS_OVERRIDES
@@ -69,10 +69,10 @@ def check_unknown_parameter(context: Context) -> Iterator[Diagnostic]:
 
 def _misspelled(node: Node) -> Iterator[Diagnostic]:
     """Yield the parameters that are passed on, but named like one that is declared."""
+    declared = tuple(parameter.name.value for parameter in node.parameters)
     for undeclared in node.undeclared_parameters:
         name = undeclared.name
-        known = (parameter.name.value for parameter in node.parameters)
-        meant = next((other for other in known if is_typo(name.value, other)), None)
+        meant = misspelled(name.value, declared)
         if meant is not None:
             message = f"node '{node.name}' does not declare parameter '{name}'"
             hint = f"did you mean '{meant}'?"

@@ -219,6 +219,7 @@ def check_keep_all(context: Context) -> Iterator[Diagnostic]:
                 )
 
 
+_SHOWN_SINKS = 3
 _SENSOR_PACKAGE = "sensor_msgs/msg/"
 #: Messages of that package that are small, and whose consumers usually request reliable QoS.
 _STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"})
@@ -260,7 +261,7 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
         port.qos.policy_span("reliability"),
         tuple(
             Label(sink.port.qos.policy_span("reliability"), f"'{port_name(sink)}' requests it")
-            for sink in sinks
+            for sink in sinks[:_SHOWN_SINKS]
         ),
         hint,
         relies_on=(("topic qos", port.full_name),),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import IntEnum
+from itertools import islice
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, error, warning
@@ -12,14 +13,26 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.resources import nodes_folder
 from composer.base.source import Span
 from composer.model import Channel, ChannelKind, Node, Port, PortOfNode
-from composer.model.qos import Incompatibility, QosProfile, incompatibilities
+from composer.model.qos import Incompatibility, QosProfile, incompatibilities, strictest
 from composer.rules.analysis.context import Context, location
 from composer.rules.analysis.formatting import listed, port_name
 
 QOS_INCOMPATIBLE = error("RC311", "qos-incompatible")
 OUTSIDE_QOS = warning("RC531", "outside-qos")
 
-_Groups = Mapping[QosProfile, list[PortOfNode]]
+#: The policies that decide whether two endpoints match.
+_POLICIES = (
+    "reliability",
+    "durability",
+    "deadline_ms",
+    "liveliness",
+    "liveliness_lease_duration_ms",
+)
+#: Profiles that are reported of those that do not match one profile. A topic hardly has more.
+_MAX_CONFLICTS = 10
+
+#: Endpoints by what these policies are, with the profile of the first one.
+_Groups = Sequence[tuple[QosProfile, list[PortOfNode]]]
 
 
 class _Origin(IntEnum):
@@ -62,22 +75,27 @@ def _has_one_type(channel: Channel) -> bool:
 
 
 def _by_profile(endpoints: Iterable[PortOfNode]) -> _Groups:
-    groups: dict[QosProfile, list[PortOfNode]] = defaultdict(list)
+    groups: dict[tuple[object, ...], list[PortOfNode]] = defaultdict(list)
     for endpoint in endpoints:
         if endpoint.port.qos.known:
-            groups[endpoint.port.qos.profile].append(endpoint)
-    return groups
+            groups[_policies(endpoint.port.qos.profile)].append(endpoint)
+    return [(ends[0].port.qos.profile, ends) for ends in groups.values()]
+
+
+def _policies(profile: QosProfile) -> tuple[object, ...]:
+    return tuple(getattr(profile, name) for name in _POLICIES)
 
 
 def _direction(
     context: Context, offering: _Groups, requesting: _Groups
 ) -> Iterator[list[QosConflict]]:
-    for offered, offers in offering.items():
-        found = [
-            (problems, requests)
-            for requested, requests in requesting.items()
-            if (problems := tuple(incompatibilities(offered, requested)))
-        ]
+    if not requesting:
+        return
+    all_together = strictest([profile for profile, _ in requesting])
+    for offered, offers in offering:
+        if not incompatibilities(offered, all_together):
+            continue
+        found = list(islice(_conflicting(offered, requesting), _MAX_CONFLICTS))
         all_requests = [endpoint for _, requests in found for endpoint in requests]
         by_place: dict[tuple[str, int, int], list[QosConflict]] = defaultdict(list)
         for problems, requests in found:
@@ -89,6 +107,15 @@ def _direction(
             conflict = QosConflict(problems, tuple(offers), tuple(requests), is_offer, place)
             by_place[location(place)].append(conflict)
         yield from by_place.values()
+
+
+def _conflicting(
+    offered: QosProfile, requesting: _Groups
+) -> Iterator[tuple[tuple[Incompatibility, ...], list[PortOfNode]]]:
+    for requested, requests in requesting:
+        problems = incompatibilities(offered, requested)
+        if problems:
+            yield problems, requests
 
 
 def _is_of_streams(problems: Sequence[Incompatibility]) -> bool:
@@ -116,14 +143,18 @@ def _is_offer_wrong(
     offer, request = (_origin(context, ends[0], policy) for ends in (offers, requests))
     if _Origin.BUILT_IN in (offer, request):
         return request is _Origin.BUILT_IN and offer is not _Origin.BUILT_IN
-    offered, requested = (
-        {location(end.port.qos.own_span(policy)) for end in ends} for ends in (offers, requests)
-    )
-    if min(len(offered), len(requested)) == 1 != max(len(offered), len(requested)):
-        return len(offered) == 1
+    has_one_place = [_has_one_place(ends, policy) for ends in (offers, requests)]
+    if any(has_one_place) and not all(has_one_place):
+        return has_one_place[0]
     if offer is not request:
         return offer < request
     return any(item.policy == "durability" for item in problems)
+
+
+def _has_one_place(ends: Sequence[PortOfNode], policy: str) -> bool:
+    """Return whether all endpoints get the policy from the same place in a file."""
+    first = location(ends[0].port.qos.own_span(policy))
+    return all(location(end.port.qos.own_span(policy)) == first for end in ends)
 
 
 def _origin(context: Context, endpoint: PortOfNode, policy: str) -> _Origin:
@@ -142,11 +173,13 @@ def _place(context: Context, endpoint: PortOfNode, policy: str) -> Span:
     if _origin(context, endpoint, policy) is not _Origin.BUILT_IN:
         return endpoint.port.qos.own_span(policy)
     name = f"{endpoint.node.name}.{endpoint.port.name}"
-    for connection in context.system.connections:
-        for end in connection.ends:
-            if end.text.value == name:
-                return end.text.span
-    return endpoint.node.name.span
+    return context.once(_connection_spans).get(name, endpoint.node.name.span)
+
+
+def _connection_spans(context: Context) -> dict[str, Span]:
+    """Return where connections name ports, the first time."""
+    ends = [end for connection in context.system.connections for end in connection.ends]
+    return {end.text.value: end.text.span for end in reversed(ends)}
 
 
 #: Maximum number of further endpoints to show for one problem.
@@ -210,16 +243,6 @@ def _labels(conflict: QosConflict) -> Iterator[Label]:
     shared = wrong.port.qos.policy_span(policy)
     if location(shared) != location(wrong.port.qos.own_span(policy)):
         yield Label(shared, f"{policy} is set here")
-
-
-#: The policies that decide whether two endpoints match.
-_POLICIES = (
-    "reliability",
-    "durability",
-    "deadline_ms",
-    "liveliness",
-    "liveliness_lease_duration_ms",
-)
 
 
 def check_outside_qos(context: Context) -> Iterator[Diagnostic]:

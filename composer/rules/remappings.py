@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from composer.base.diagnostics import (
@@ -16,7 +16,7 @@ from composer.base.diagnostics import (
     suggestion,
     warning,
 )
-from composer.base.spelling import is_typo
+from composer.base.spelling import misspelled
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
 from composer.model.names import expand_name, remapped_name, topic_name_problem
 from composer.rules.analysis.context import Context, is_unresolved
@@ -32,36 +32,44 @@ def own_name(node: Node, name: str) -> str:
     return expand_name(name, node.ros_name.value, node.namespace.value)
 
 
-def matched_ports(node: Node, remapping: Remapping) -> Iterator[Port]:
-    """Yield the ports whose declared name the remapping replaces."""
-    source = own_name(node, remapped_name(remapping.source.value))
-    for port in node.all_ports:
-        if own_name(node, port.ros_name.value) == source:
-            yield port
+_Ports = Mapping[str, Sequence[Port]]
+
+
+def _ports_by_name(node: Node) -> _Ports:
+    """Return the ports by their full names before remapping."""
+    ports: dict[str, list[Port]] = defaultdict(list)
+    for port in node.all_ports if node.remappings else ():
+        ports[own_name(node, port.ros_name.value)].append(port)
+    return ports
+
+
+def _matched_ports(node: Node, ports: _Ports, remapping: Remapping) -> Sequence[Port]:
+    """Return the ports whose declared name the remapping replaces."""
+    return ports.get(own_name(node, remapped_name(remapping.source.value)), ())
 
 
 _RULE_IF_PASSED_ON = replace(UNKNOWN_REMAPPING, severity=Severity.INFO)
-#: Names that every ROS node has without declaring them, before expansion.
-_EVERY_NODE = (
-    "/clock",
-    "/diagnostics",
-    "/parameter_events",
-    "/rosout",
-    "~/describe_parameters",
-    "~/get_logger_levels",
-    "~/get_parameter_types",
-    "~/get_parameters",
-    "~/get_type_description",
-    "~/list_parameters",
-    "~/set_logger_levels",
-    "~/set_parameters",
-    "~/set_parameters_atomically",
-    "~/change_state",
-    "~/get_available_states",
-    "~/get_available_transitions",
-    "~/get_state",
-    "~/get_transition_graph",
-    "~/transition_event",
+#: Topics and services that every ROS node has without declaring them.
+_OF_EVERY_NODE = frozenset(("/clock", "/diagnostics", "/parameter_events", "/rosout"))
+#: The same, in the namespace with the name of the node.
+_PRIVATE_OF_EVERY_NODE = frozenset(
+    (
+        "describe_parameters",
+        "get_logger_levels",
+        "get_parameter_types",
+        "get_parameters",
+        "get_type_description",
+        "list_parameters",
+        "set_logger_levels",
+        "set_parameters",
+        "set_parameters_atomically",
+        "change_state",
+        "get_available_states",
+        "get_available_transitions",
+        "get_state",
+        "get_transition_graph",
+        "transition_event",
+    )
 )
 
 
@@ -70,18 +78,19 @@ def check_unknown_remapping(context: Context) -> Iterator[Diagnostic]:
     for node in context.system.nodes:
         if not node.complete or any(is_unresolved(port.ros_name.value) for port in node.ports):
             continue
+        ports = _ports_by_name(node)
+        names = tuple(port.ros_name.value for port in node.ports)
         for remapping in node.remappings:
             source = remapping.source
-            if _is_known(node, remapping) or (
-                node.gets_undeclared
-                and not any(is_typo(source.value, port.ros_name.value) for port in node.ports)
+            if _is_known(node, ports, remapping) or (
+                node.gets_undeclared and misspelled(source.value, names) is None
             ):
                 continue
             yield Diagnostic(
                 _RULE_IF_PASSED_ON if node.gets_undeclared else UNKNOWN_REMAPPING,
                 f"node '{node.name}' has no port named '{source}' to remap",
                 source.span,
-                hint=_remapping_hint(node, source.value),
+                hint=_remapping_hint(node, source.value, names),
                 subjects=() if node.gets_undeclared else tuple(_names_meant(node, remapping)),
             )
 
@@ -93,20 +102,24 @@ def _names_meant(node: Node, remapping: Remapping) -> Iterator[Subject]:
         yield from wiring(node, port)
 
 
-def _is_known(node: Node, remapping: Remapping) -> bool:
+def _is_known(node: Node, ports: _Ports, remapping: Remapping) -> bool:
     source = remapping.source.value
     if is_unresolved(source) or topic_name_problem(source) is not None:
         return True  # cannot be checked, or is reported by another rule
-    return any(matched_ports(node, remapping)) or own_name(node, source) in {
-        own_name(node, name) for name in _EVERY_NODE
-    }
+    full_name = own_name(node, source)
+    folder, _, name = full_name.rpartition("/")
+    return (
+        full_name in _OF_EVERY_NODE
+        or (name in _PRIVATE_OF_EVERY_NODE and folder == own_name(node, "~"))
+        or bool(_matched_ports(node, ports, remapping))
+    )
 
 
-def _remapping_hint(node: Node, source: str) -> str | None:
+def _remapping_hint(node: Node, source: str, names: tuple[str, ...]) -> str | None:
     port = node.port(source)
     if port is not None:
         return f"the {port.kind.channel} of port '{source}' is named '{port.ros_name}'"
-    return suggestion(source, [port.ros_name.value for port in node.ports])
+    return suggestion(source, names)
 
 
 def check_remapping_collision(context: Context) -> Iterator[Diagnostic]:
@@ -118,13 +131,16 @@ def check_remapping_collision(context: Context) -> Iterator[Diagnostic]:
         for port in node.ports:
             joined[port.kind, port.full_name].append(port)
         reported: set[tuple[PortKind, str]] = set()
+        ports = _ports_by_name(node)
         for remapping in node.remappings:
-            yield from _collision(node, remapping, joined, reported)
+            matched = _matched_ports(node, ports, remapping)
+            yield from _collision(node, remapping, matched, joined, reported)
 
 
 def _collision(
     node: Node,
     remapping: Remapping,
+    matched: Sequence[Port],
     joined: dict[tuple[PortKind, str], list[Port]],
     reported: set[tuple[PortKind, str]],
 ) -> Iterator[Diagnostic]:
@@ -132,7 +148,7 @@ def _collision(
     if is_unresolved(remapping.target.value):
         return
     target = own_name(node, remapping.target.value)
-    for port in matched_ports(node, remapping):
+    for port in matched:
         others = [other for other in joined[port.kind, target] if other is not port]
         if port.full_name == target and others and (port.kind, target) not in reported:
             reported.add((port.kind, target))
@@ -155,8 +171,10 @@ _NAMES_IN_CODE = (
 def check_unused_remapping(context: Context) -> Iterator[Diagnostic]:
     """Check the final names of remapped ports."""
     for node in context.system.nodes:
+        ports_by_name = _ports_by_name(node)
         for remapping in node.remappings:
-            yield from _overridden_remapping(node, remapping)
+            matched = _matched_ports(node, ports_by_name, remapping)
+            yield from _overridden_remapping(node, remapping, matched)
         # In a class or a program, the name of a port is what the connection renames.
         if not node.remappings and node.implementation not in _NAMES_IN_CODE:
             for port in node.ports:
@@ -181,9 +199,10 @@ def _overridden_name(node: Node, port: Port) -> Iterator[Diagnostic]:
         )
 
 
-def _overridden_remapping(node: Node, remapping: Remapping) -> Iterator[Diagnostic]:
+def _overridden_remapping(
+    node: Node, remapping: Remapping, ports: Sequence[Port]
+) -> Iterator[Diagnostic]:
     target = remapping.target.value
-    ports = list(matched_ports(node, remapping))
     if not ports or is_unresolved(target):
         return
     expected = own_name(node, target)

@@ -14,6 +14,9 @@ from tests.unit.support.growth import assert_linear
 SMALL, LARGE = 100, 800
 STRING = "type: std_msgs/msg/String"
 NODES = f"  node_#: {{publishers: {{a: {{{STRING}}}}}, subscriptions: {{x: {{{STRING}}}}}}}\n"
+PORTS = f"      port_#: {{{STRING}}}\n"
+IMAGE = "type: sensor_msgs/msg/Image, topic: /t, qos: command"
+DEADLINE = f"{STRING}, topic: /t, qos: {{deadline_ms"
 
 #: By name: parts of a file, each a heading and a line that is there once for every number; and a
 #: rule that finds something in it.
@@ -50,6 +53,52 @@ SYSTEMS: dict[str, tuple[list[tuple[str, str]], str]] = {
     "one node with many ports": (
         [("nodes:\n  one:\n    publishers:\n", f"      port_#: {{{STRING}}}\n")],
         "publisher-without-subscription",
+    ),
+    "remappings misspelt": (
+        [
+            ("nodes:\n  one:\n    executable: {package: a, name: b}\n    publishers:\n", PORTS),
+            ("    remappings:\n", "      porto_#: topic_#\n"),
+        ],
+        "unknown-remapping",
+    ),
+    "sensor streams on one topic": (
+        [
+            (
+                "nodes:\n",
+                f"  node_#: {{publishers: {{p: {{{IMAGE}}}}}, "
+                "timers: {t: {rate_hz: 30, publish: {p: {}}}}}\n",
+            ),
+            ("", f"  other_#: {{subscriptions: {{s: {{{IMAGE}}}}}}}\n"),
+        ],
+        "unsuited-qos",
+    ),
+    "deadlines on one topic": (
+        [
+            ("nodes:\n", f"  node_#: {{publishers: {{p: {{{DEADLINE}: 10#}}}}}}}}\n"),
+            ("", f"  other_#: {{subscriptions: {{s: {{{DEADLINE}: 0.#1}}}}}}}}\n"),
+        ],
+        "qos-incompatible",
+    ),
+    "deadlines that match": (
+        [
+            ("nodes:\n", f"  node_#: {{publishers: {{p: {{{DEADLINE}: 0.#1}}}}}}}}\n"),
+            ("", f"  other_#: {{subscriptions: {{s: {{{DEADLINE}: 10#}}}}}}}}\n"),
+        ],
+        "unused-declaration",
+    ),
+    "states": (
+        [
+            ("nodes:\n  one:\n    state:\n", "      state_#: 0\n"),
+            ("    timers:\n", "      t_#: {rate_hz: 1, set: {state_#: '{state.state_# + 1}'}}\n"),
+        ],
+        "unused-declaration",
+    ),
+    "timers with parameters": (
+        [
+            ("nodes:\n  one:\n    parameters:\n", "      rate_#: 1.0\n"),
+            ("    timers:\n", "      t_#: {rate_hz: '{parameters.rate_#}', log: x}\n"),
+        ],
+        "unused-declaration",
     ),
     "one that all wait for": (
         [("nodes:\n  first: {}\n", "  node_#: {lifecycle: {depends_on: [first]}}\n")],

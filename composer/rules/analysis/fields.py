@@ -68,15 +68,17 @@ def field_problems(context: Context) -> tuple[FieldProblem, ...]:
 
 
 def _problems(context: Context) -> Iterator[FieldProblem]:
-    known = {node.name.value: _node_names(node) for node in context.system.nodes}
+    nodes = context.system.nodes
+    states = {node.name.value: _state_types(node) for node in nodes}
+    known = {node.name.value: _node_names(node, states[node.name.value]) for node in nodes}
     for site in reactions(context.system):
         scope = _scope(context, known[site.node.name.value], site.event, site.port)
         checker = FieldChecker(context.interfaces, scope)
         own = None if site.port is None else (site.node.name.value, site.port.name.value)
-        for problem in _reaction(context, checker, site):
+        for problem in _reaction(context, checker, site, states[site.node.name.value]):
             yield FieldProblem(problem, own)
         yield from _sends(context, checker, site.node, site.reaction)
-    for node in context.system.nodes:
+    for node in nodes:
         for port in node.ports:
             if port.accept is not None or port.feedback is not None or port.result is not None:
                 scope = _scope(context, known[node.name.value], Event.GOAL, port)
@@ -104,7 +106,11 @@ def _period(
         yield from (problem for problem in problems if problem.missing)
 
 
-def _node_names(node: Node) -> _NameTypes:
+def _state_types(node: Node) -> _NameTypes:
+    return _NameTypes({name.value: type_of(value) for name, value in node.state})
+
+
+def _node_names(node: Node, state: _NameTypes) -> _NameTypes:
     parameters = _NameTypes(
         {
             item.name.value: ANYTHING
@@ -113,7 +119,6 @@ def _node_names(node: Node) -> _NameTypes:
             for item in node.parameters
         }
     )
-    state = _NameTypes({name.value: type_of(value) for name, value in node.state})
     types: dict[str, ValueType] = dict.fromkeys(COMMON_NAMES, ANYTHING)
     types |= {"parameters": parameters, "state": state}
     types |= {"count": INTEGER, "now": NUMBER, "node": STRING}
@@ -143,14 +148,15 @@ def _type_of_name(name: str, definition: Message | Service | Action | None) -> V
     return found if isinstance(found, Message) else ANYTHING
 
 
-def _reaction(context: Context, checker: FieldChecker, site: ReactionSite) -> Iterator[Problem]:
+def _reaction(
+    context: Context, checker: FieldChecker, site: ReactionSite, states: _NameTypes
+) -> Iterator[Problem]:
     reaction = site.reaction
     if reaction.when is not None:
         yield from checker.condition(reaction.when, reaction.when_span or reaction.span)
-    initial = {name.value: type_of(value) for name, value in site.node.state}
     for name, content in reaction.state:
         found = list(checker.text(content))
-        yield from found or _state(content, initial.get(name.value, ANYTHING), checker)
+        yield from found or _state(content, states.get(name.value, ANYTHING), checker)
     if reaction.log is not None:
         yield from checker.text(reaction.log)
     if reaction.respond is not None:
