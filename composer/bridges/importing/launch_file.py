@@ -24,7 +24,7 @@ from composer.launch.variants import (
     with_references,
 )
 from composer.model import LogLevel
-from composer.model.names import join_node_name, parameter_name_problem, split_node_name
+from composer.model.names import join_node_name, split_node_name
 from composer.model.resolve.parameters import rclpy_type
 
 _PORTS = (
@@ -347,7 +347,7 @@ def _declared(
 ) -> Iterable[FoundParameter]:
     for name, value in item["parameters"].items():
         kind = rclpy_type(item["samples"].get(name, value))
-        if kind is None or (parameter_name_problem(name) and "/" not in name):
+        if kind is None:
             left_out.append(f"parameter {name} of {full_name}: its type is not known")
         else:
             yield FoundParameter(name, kind, value)

@@ -7,12 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, ChannelKind, PortKind
-from composer.model.names import (
-    is_selected,
-    parameter_name_problem,
-    split_node_name,
-    topic_name_problem,
-)
+from composer.model.names import is_selected, split_node_name, topic_name_problem
 from composer.model.qos import PRESETS, QosProfile
 from composer.model.resolve.parameters import rclpy_type
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
@@ -132,10 +127,7 @@ def _parameters(
             continue
         described = dict(settings.get(name, {}))
         kind = described.pop("type", None) or rclpy_type(value)
-        if parameter_name_problem(name):
-            problem = parameter_name_problem(name)
-            left_out.append(f"parameter {name!r} of {node.full_name}: the name {problem}")
-        elif kind is None or value is None:
+        if kind is None or value is None:
             left_out.append(f"parameter {name} of {node.full_name}: it has no value")
         else:
             yield FoundParameter(name, str(kind), value, described)

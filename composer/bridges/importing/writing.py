@@ -208,7 +208,8 @@ def _literal(text: str) -> str:
 def readable(found: FoundSystem) -> FoundSystem:
     """Return what a file can hold: parameters without long values, and the first nodes.
 
-    The language has neither control characters nor numbers that are not finite.
+    The language has neither control characters nor numbers that are not finite, and ``${`` in a
+    name begins a variable.
     """
     left_out = list(found.left_out)
     nodes = []
@@ -216,7 +217,9 @@ def readable(found: FoundSystem) -> FoundSystem:
         kept = []
         for item in node.parameters:
             what, size = f"parameter {item.name} of {node.full_name}", len(str(item.value))
-            if size > _MAX_CHARACTERS:
+            if not item.name or "${" in item.name or not _is_readable(item.name):
+                left_out.append(f"parameter {item.name!r} of {node.full_name}: an invalid name")
+            elif size > _MAX_CHARACTERS:
                 left_out.append(f"{what}: its value has {size:,} characters")
             elif _is_readable(item.value):
                 kept.append(_with_readable_settings(item))

@@ -81,7 +81,8 @@ def generate_launch_description():
         SetEnvironmentVariable("PROBE_ALL", "all"),
         Node(package="probe", executable="probe"),
         Node(package="probe", executable="probe", name="renamed", namespace="robot1",
-             parameters=[{"rate": rate, "count": 3, "on": True, "names": ["a", "b"], "text": "3"}],
+             parameters=[{"rate": rate, "count": 3, "on": True, "names": ["a", "b"], "text": "3",
+                          "gain.1": 16}],
              remappings=[("chatter", "/news"), ("~/state", "status")],
              additional_env={"PROBE_ONE": "one"}, arguments=["--flag", "value"]),
         GroupAction([

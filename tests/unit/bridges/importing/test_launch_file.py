@@ -156,7 +156,7 @@ def test_the_nodes_of_a_launch_file_are_executables() -> None:
         executable="listener.py",
         arguments=["-v"],
         remappings={"x": "/y"},
-        parameters={"rate": 2, "empty": []},
+        parameters={"rate": 2, "gain.1": 16, "empty": []},
         environment={"A": "b"},
         lifecycle=True,
         note="after 3 s",
@@ -185,7 +185,7 @@ nodes:
       arguments: ["-v"]
       environment: {A: b}
       lifecycle: managed
-    parameters: {rate: {type: integer, default: 2}}
+    parameters: {rate: {type: integer, default: 2}, gain.1: {type: integer, default: 16}}
     remappings: {x: /y}
 """
     )

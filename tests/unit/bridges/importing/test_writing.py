@@ -164,6 +164,13 @@ LARGE = 3_000_000
         ([FoundParameter("numbers", "integer_array", [1] * 300_000)], ["numbers"]),
         ([FoundParameter("broken", "string", "a\x1b[2J")], ["broken"]),
         ([FoundParameter("broken", "double_array", [1.0, math.nan])], ["broken"]),
+        (
+            [
+                FoundParameter(name, "integer", 1)
+                for name in ("exposure.1", "1st gain", "a..b.", "/topic", "", "a\x1b[2J", "${text}")
+            ],
+            ["", "a\x1b[2J", "${text}"],
+        ),
         ([FoundParameter("described", "bool", True, {"description": "\u202e"})], []),
         ([FoundParameter("a", "integer", 3, {"minimum": 5, "maximum": 1})], []),
         ([FoundParameter("a", "double", 3.0, {"minimum": 5.0})], []),
