@@ -230,6 +230,8 @@ def _answer(line: str, spin_s: float, domain_id: int) -> str:
             output, _ = process.communicate()
         finally:
             limit.cancel()
+    # Tools that cannot run agree about everything.
+    assert "Failed to load entry point" not in output, output
     return _without_chance(f"{output}exit code {process.returncode}")
 
 

@@ -67,6 +67,24 @@ def test_the_budget(
 
 
 @pytest.mark.parametrize(
+    ("then", "action"),
+    [
+        ("", OnFailure.ISOLATE),
+        (", then: isolate", OnFailure.ISOLATE),
+        (", then: shutdown", OnFailure.SHUTDOWN),
+    ],
+)
+def test_a_node_without_restarts_left_is_given_up_alone_unless_told_otherwise(
+    then: str, action: OnFailure
+) -> None:
+    system = robot(f"{{on_failure: restart, restart: {{max_attempts: 1{then}}}}}")
+    desired = DesiredState(states("aaaaa"), restarts={"sensor": (97.0,)})
+    decision = decide(system, desired, fault("sensor"), NOW_S)
+    assert decision is not None
+    assert (decision.action, decision.condition) == (action, "given up")
+
+
+@pytest.mark.parametrize(
     ("policy", "kind", "action", "condition", "consequence"),
     [
         ("isolate", FaultKind.SILENCE, OnFailure.ISOLATE, "isolated", "isolating it"),
