@@ -230,9 +230,10 @@ class Transforms(Protocol):
     """The frames of tf2, for a node with `transforms`.
 
     A transform is a geometry_msgs/msg/TransformStamped. It maps coordinates in the frame
-    ``source`` to those in the frame ``target``. A ``stamp`` is a builtin_interfaces/msg/Time, such
-    as that of a message header; None, or zero as in tf2, is the latest time at which all transforms
-    between the frames are known. Between two received transforms, values are interpolated.
+    ``source`` to coordinates in the frame ``target``. A ``stamp`` is a builtin_interfaces/msg/Time,
+    as in the header of a message. Without it, or with zero as in tf2, the lookup uses the latest
+    time at which every transform between the frames is available. Between two received transforms,
+    values are interpolated.
     """
 
     def lookup(self, target: str, source: str, *, stamp: Time | None = None) -> TransformStamped:

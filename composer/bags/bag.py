@@ -124,7 +124,7 @@ def joined(summaries: Iterable[Summary]) -> Summary:
 
 
 def full_type_name(name: str) -> str:
-    """Return the name of a message type as in ROS 2: ``std_msgs/String`` is the one of ROS 1."""
+    """Return the name of a message type as in ROS 2. ROS 1 writes ``std_msgs/String``."""
     return name.replace("/", "/msg/") if name.count("/") == 1 else name
 
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 def main(arguments: Sequence[str] | None = None, *, is_interruptible: bool = False) -> int:
     """Run a command and return the exit code. No exception is raised.
 
-    ``arguments`` defaults to those of the process. With ``is_interruptible``, Ctrl-C interrupts
-    the command; before and after, it ends the process.
+    ``arguments`` defaults to the arguments of the process. With ``is_interruptible``, Ctrl-C
+    interrupts the command; before and after, it ends the process.
     """
     from composer.cli.program import run_command
 

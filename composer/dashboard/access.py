@@ -152,7 +152,7 @@ class Access:
     def _is_own(self, host: str) -> bool:
         """Return whether a Host header names this server.
 
-        An address is never rebound; a name must be that of this computer.
+        An address is never rebound; a name must be a name of this computer.
         """
         try:
             parts = urlsplit(f"//{host}")

@@ -212,7 +212,7 @@ def _forks(name: str, used: set[str]) -> bool:
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:
-    """Return a key for sorting by which area2 comes before area10."""
+    """Return a key for sorting that puts area2 before area10."""
     return [
         (int(item), "") if item.isdigit() else (-1, item) for item in re.split(r"([0-9]+)", name)
     ]

@@ -21,7 +21,7 @@ def listing(
 ) -> Iterator[str]:
     """Yield the lines of the definition ``name``, each message below the field that has its type.
 
-    ``comments`` are those of the outer message, with its empty lines.
+    ``comments`` are the comments of the outer message, with its empty lines.
 
     A definition without text, as in the snapshot or of OMG IDL, has no comments. A message that
     contains itself, ``above``, is not expanded again.

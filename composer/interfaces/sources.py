@@ -35,7 +35,7 @@ _SKIPPED = frozenset(("build", "install", "log", "node_modules", "site-packages"
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """The text of a definition. ``path`` is empty for the bundled ones.
+    """The text of a definition. ``path`` is empty for bundled definitions.
 
     ``problem`` says why the file has no text, or None.
     """

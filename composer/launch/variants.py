@@ -48,11 +48,11 @@ def with_references(text: str) -> str:
 
 
 def all_visits(visit: Callable[[Mapping[str, str]], Visit], given: Mapping[str, str]) -> Visit:
-    """Return the visits with the values of the arguments that matter.
+    """Return the visits for each combination of values of the arguments that matter.
 
-    ``values`` of each visit are those of arguments with several values. ``resolved`` are arguments
-    that keep their values, because the launch file needs them before its nodes are known, or fails
-    with others: the reason by the name, if it is known.
+    ``values`` of a visit has the arguments with several values. ``resolved`` has the arguments that
+    keep their values, with the reason if there is one: the launch file needs the value before it
+    has nodes, or fails with other values.
     """
     base = visit(given)
     tried = _tried_values(visit, given, base)

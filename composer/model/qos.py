@@ -131,7 +131,7 @@ def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incom
     """Return all policies that prevent two endpoints from matching.
 
     A publisher or server offers, a subscription or client requests, and the offer must be at least
-    as strong. The rule is that of DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
+    as strong. The rule comes from DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
     states it. History, depth and lifespan never matter.
     """
     return tuple(_incompatibilities(offered, requested))

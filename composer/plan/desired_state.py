@@ -80,7 +80,7 @@ class DesiredState:
 
     ``serial`` is the number of the last requested transition or failure; ``moved`` and ``failed``
     are the numbers of the last requested transition of each node, and of the failure that keeps it
-    down. ``activity`` is that of the system with these goals: "running", "paused" or "reset".
+    down. ``activity`` is what the system is with these goals: "running", "paused" or "reset".
     """
 
     goals: Mapping[str, PrimaryState]

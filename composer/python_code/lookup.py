@@ -72,14 +72,14 @@ class BehaviorSource:
 
     @cached_property
     def by_name(self) -> Mapping[str, Method]:
-        """The methods by name; of several with one name, the one of the nearest class."""
+        """The methods by name; the nearest class wins."""
         every = [method for _, class_ in self.classes for method in class_.methods]
         nearest = {method.name: method for method in reversed(every)}
         return {method.name: nearest[method.name] for method in every}
 
     @property
     def methods(self) -> Collection[Method]:
-        """The methods of the class and its bases, those of the nearest class first."""
+        """The methods of the class and its bases, the nearest class first."""
         return self.by_name.values()
 
     @property

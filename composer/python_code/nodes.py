@@ -181,7 +181,7 @@ def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
 
 
 def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
-    """Yield ``methods`` and those of their class that they call, directly or through others."""
+    """Yield ``methods``, and the methods of their class that they call, directly or not."""
     pending, seen = list(methods), {method.name for method in methods}
     while pending:
         current = pending.pop()

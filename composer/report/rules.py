@@ -41,7 +41,7 @@ def select_diagnostics(
     select: Iterable[str],
     ignore: Iterable[str],
 ) -> list[Diagnostic]:
-    """Return the diagnostics of the selected rules, without those of the ignored rules.
+    """Return the diagnostics of the selected rules that are not ignored.
 
     A rule is given by its code (``RC301``), a code prefix (``RC3``) or its name. If ``select`` is
     empty, all rules are selected. Raises UnknownRule if a text matches none of ``rules``.

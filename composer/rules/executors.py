@@ -130,7 +130,7 @@ def _process_text(node: Node) -> str:
 
 
 def check_executor_outside_process(context: Context) -> Iterator[Diagnostic]:
-    """Compare the CPUs of the executors with those of the processes of their nodes."""
+    """Compare the CPUs of executors with the CPUs of the processes of their nodes."""
     system = context.system
     processes = {process.name.value: process for process in system.processes}
     executors = {executor.name.value: executor for executor in system.executors}

@@ -29,7 +29,7 @@ HIDDEN_NAME = info("RC232", "hidden-name")
 
 
 def check_invalid_node_name(context: Context) -> Iterator[Diagnostic]:
-    """Check the name of every node, and those of inner nodes, which may be in a namespace."""
+    """Check the names of nodes, and of inner nodes, which may be in a namespace."""
     names = {node.ros_name.value for node in context.system.nodes}
     for node in context.system.nodes:
         yield from _check_node_name(node.ros_name, names)

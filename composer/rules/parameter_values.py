@@ -66,7 +66,7 @@ def check_parameter_range(context: Context) -> Iterator[Diagnostic]:
 
 
 def _label(cause: Located[Any], value: Located[Plain], text: str) -> tuple[Label, ...]:
-    """Return a label for what is declared; those of QoS policies are declared nowhere."""
+    """Return a label for what is declared; QoS policies are declared nowhere."""
     return () if cause.span == value.span else (Label(cause.span, text),)
 
 

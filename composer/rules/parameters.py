@@ -187,7 +187,7 @@ def check_missing_parameter(context: Context) -> Iterator[Diagnostic]:
 
 
 def check_similar_parameter(context: Context) -> Iterator[Diagnostic]:
-    """Compare the unused parameters of derived types with those of their base types."""
+    """Compare the unused parameters of derived types and of their base types."""
     nodes = context.system.nodes
     # What uses the parameters of a program is unknown.
     derived = [

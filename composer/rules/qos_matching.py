@@ -246,7 +246,7 @@ def _labels(conflict: QosConflict) -> Iterator[Label]:
 
 
 def check_outside_qos(context: Context) -> Iterator[Diagnostic]:
-    """Compare the QoS of connections with that of ports outside the process."""
+    """Compare the QoS of connections and of ports outside the process."""
     reported: set[Span] = set()
     for node in context.system.nodes:
         if node.implementation.in_process:

@@ -157,7 +157,7 @@ _TOLERANCE = 1.001
 
 
 def check_rotation_unit(context: Context) -> Iterator[Diagnostic]:
-    """Check the angles of static transforms; those of a node type once."""
+    """Check the angles of static transforms, once for each node type."""
     for node in context.system.nodes:
         for static in node.transforms.static if node.transforms is not None else ():
             for angle in static.angles_rad:

@@ -108,7 +108,7 @@ def _meant_port(context: Context, connection: Connection, end: Endpoint) -> str 
 
 
 def misnamed_connection(context: Context, mismatch: TypeMismatch) -> Connection | None:
-    """Return the connection whose name is that of another one with ports of another type."""
+    """Return the connection that has the name of another one with ports of another type."""
     connections = _connections(context, mismatch)
     types = [
         {

@@ -71,7 +71,7 @@ class Result:
 class Options:
     """How scenarios are run. ``seed`` takes precedence over the seeds of the scenarios.
 
-    With ``traced``, the results have a trace, by which runs can be compared.
+    With ``traced``, the results have a trace, so that runs can be compared.
     """
 
     real_time: bool = False

@@ -92,7 +92,7 @@ class Faults:
                 setattr(behavior, name, self.callback(node.full_name, name, handler))
 
     def callback(self, node: str, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function by which faults act before each call of a handler or a callback."""
+        """Return a function that lets faults act before each call of a handler or callback."""
         self._handler_names[node][name] = None
         return _with_faults(name, function, self._handlers[node])
 

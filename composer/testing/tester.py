@@ -1,4 +1,4 @@
-"""The node by which a test takes part in a system: the other end of each topic and server."""
+"""The node of a test in a system: the other end of each topic and server."""
 
 from __future__ import annotations
 

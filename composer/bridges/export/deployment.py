@@ -48,10 +48,10 @@ _MEGABYTE = 1_000_000
 class Service:
     """A process as one service.
 
-    ``label`` is its name there, a DNS label and unique. ``full_name`` is that of its manager's
-    namespace, by which ``compose ps`` knows it. ``options`` follow ``compose run SYSTEM``.
-    ``priority`` is the highest real-time priority that it needs. If it ``is_server``, it runs the
-    discovery servers of one computer, another one if ``server_host`` is its name.
+    ``label`` is a unique DNS label. ``full_name``, the namespace of its manager, is its name for
+    ``compose ps``. ``options`` follow ``compose run SYSTEM``. ``priority`` is the highest real-time
+    priority that it needs. If it ``is_server``, it runs the discovery servers of a computer: of
+    this one, or of ``server_host``.
     """
 
     label: str
@@ -63,7 +63,7 @@ class Service:
     server_host: str | None = None
 
     def command(self, file: str) -> list[str]:
-        """Return the words after ``compose`` that run it; ``file`` is that of the system."""
+        """Return the words after ``compose`` that run the service; ``file`` is the system file."""
         if self.is_server:
             return ["hosts", "discovery-server", file, *self.options]
         return ["run", file, *self.options]

@@ -313,7 +313,7 @@ def _executable(item: Mapping[str, Any]) -> Plain:
 
 
 def _log_level(ros_arguments: list[str]) -> str | None:
-    """Return the level, if the arguments set that of all loggers and nothing else."""
+    """Return the level, if the arguments set only one level, for all loggers."""
     match ros_arguments:
         case ["--log-level", level] if level.lower() in [item.value for item in LogLevel]:
             return str(level.lower())

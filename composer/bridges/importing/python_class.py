@@ -52,7 +52,7 @@ class ClassNotFound(Exception):
 def describe_class(text: str, folder: Path) -> tuple[FoundNode, tuple[str, ...]]:
     """Return the node of a class ``module:Class``, and what its source does not show.
 
-    The module is searched as that of a behavior in a file in ``folder``. Raises ClassNotFound.
+    Python looks for the module as for the module of a behavior in ``folder``. Raises ClassNotFound.
     """
     located = Located(text, Span(SourceFile("", text), 1, 1, len(text)))
     source = find_behavior(BehaviorReference(located, folder))

@@ -41,7 +41,7 @@ class CStream:
     def redirect(self, fd: int) -> bool:
         """Write to ``fd`` from now on; return False if that is not possible.
 
-        Libraries that copy the variable when they are loaded have to be loaded after that.
+        Load libraries that copy the variable after this call.
         """
         stream = None if self._file is None else self._libc.fdopen(fd, b"w")
         if self._file is None or stream is None:

@@ -79,7 +79,7 @@ class OutputQueue:
         max_waiting: int = _MAX_WAITING_CHARACTERS,
         name: str = "console",
     ) -> None:
-        """Let ``max_waiting`` characters wait. ``name`` is that of the thread."""
+        """Let ``max_waiting`` characters wait. ``name`` is the name of the thread."""
         self._sink = sink
         self._note = note
         self._max_waiting = max_waiting

@@ -28,7 +28,7 @@ _LAUNCH_ARGUMENT = re.compile(r"([A-Za-z_][A-Za-z0-9_]*):=(.*)", re.DOTALL)
 
 
 def split_arguments(words: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return the files and names among words, and the values of arguments: NAME=VALUE, no file.
+    """Split words into files or names, and values of arguments: NAME=VALUE that is not a file.
 
     Raises typer.BadParameter.
     """

@@ -6,7 +6,7 @@ other program writes bytes to its standard input occasionally. When that closes,
 group. So the command ends if the other program ends or is killed, if its computer is switched off,
 and if the network between them fails for that long, but not if it fails for a shorter time.
 
-The exit code is that of the command; 128 + N if a signal has ended it.
+The exit code is the command's; 128 + N if a signal has ended it.
 """
 
 from __future__ import annotations

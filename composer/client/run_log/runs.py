@@ -101,12 +101,12 @@ class Run:
 
     @property
     def name(self) -> str:
-        """The name of the run, by which runs are in the order of their start."""
+        """The name of the run; sorted by name, runs are in the order of their start."""
         return self.folder.name
 
     @property
     def is_of_part(self) -> bool:
-        """Whether the run is that of a process of a system."""
+        """Whether a process of a system, and not the whole system, made the run."""
         return self.about().get("part") is True
 
     @property
@@ -122,7 +122,7 @@ class Run:
 
     @property
     def whole_system(self) -> str:
-        """The full name of the system, if the run is that of a process of it."""
+        """The full name of the system, if a process of the system made the run."""
         return self.system.rpartition("/")[0]
 
     @property

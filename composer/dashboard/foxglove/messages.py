@@ -91,8 +91,8 @@ _CLOCK_PROFILE = QosProfile(depth=1, reliability=Reliability.BEST_EFFORT)
 class TopicFeed(Feed):
     """The messages of a topic, as bytes.
 
-    Of large messages, a client gets the latest, and all clients share one subscription. Of others,
-    each has a subscription of its own, so that it gets the latched messages.
+    All clients share one subscription to large messages, and get the latest one. For other
+    messages, each client has a subscription of its own, so that it gets the latched messages.
     """
 
     period_s = _POLL_S

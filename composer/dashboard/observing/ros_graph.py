@@ -223,7 +223,7 @@ class _States:
         self._known = {**self._known, **states}
 
     def of(self, nodes: Set[str]) -> dict[str, str | None]:
-        """Return the states that are known, and ask for new ones if it is time."""
+        """Return the last states of nodes (None: not received yet), and ask for new ones if due."""
         now_s = time.monotonic()
         if nodes and now_s >= self._due_s and not self._is_asking:
             self._is_asking = True

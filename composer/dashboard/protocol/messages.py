@@ -88,7 +88,7 @@ def unknown(what: str, name: str, choices: Iterable[str]) -> BadRequestError:
 class ClientRequest:
     """A request: ``id`` is the browser's, ``op`` what to do, ``values`` everything else.
 
-    Its characters are those of ``text``.
+    It has the characters of ``text``.
     """
 
     id: int | str

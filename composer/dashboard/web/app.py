@@ -249,7 +249,7 @@ def index_of(view: str) -> bytes:
 
 @cache
 def style_sheet() -> bytes:
-    """Return the styles of the page, after those of diagrams, as one file."""
+    """Return the styles of diagrams and of the page as one file."""
     from composer.graph.formats.theme import page_style
 
     texts = (file_of_page(name).read_text(encoding="utf-8") for name in _STYLES)

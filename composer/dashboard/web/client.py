@@ -41,7 +41,7 @@ class Running:
 
 
 class Client(ABC):
-    """The connection of one program. Its protocol is that of the subclass."""
+    """The connection of one program; a subclass adds the protocol."""
 
     def __init__(self, dashboard: Dashboard, socket: WebSocket, outbox: Outbox) -> None:
         self._dashboard = dashboard

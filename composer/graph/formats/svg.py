@@ -76,7 +76,7 @@ def contents(graph: Graph, layout: Layout) -> Iterator[str]:
 
 
 def markers() -> str:
-    """Return arrow heads, one per color, since a marker cannot inherit that of its line."""
+    """Return arrow heads, one per color, since a marker cannot inherit the color of its line."""
     kinds = [*(kind.value for kind in EdgeKind), *Mark]
     return "<defs>" + "".join(map(_marker, kinds)) + "</defs>"
 

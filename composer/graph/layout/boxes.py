@@ -195,9 +195,9 @@ class Axes:
         return (size.height, size.width) if self.down else (size.width, size.height)
 
     def size(self, along: float, across: float) -> Size:
-        """Return the size of which the two extents are given."""
+        """Return the size with these two extents."""
         return Size(across, along) if self.down else Size(along, across)
 
     def point(self, along: float, across: float) -> Point:
-        """Return the point of which the two coordinates are given."""
+        """Return the point with these two coordinates."""
         return Point(across, along) if self.down else Point(along, across)

@@ -155,7 +155,7 @@ def _self_loops(box: Box, edges: list[Edge], sizes: Sizes, axes: Axes) -> Iterat
 
 
 class _Chains:
-    """Joins boxes by bends on the ranks between them, one of which holds the label.
+    """Joins boxes by bends on the ranks between them. One bend holds the label.
 
     Edges with a common source or target share segments as long as possible.
     """

@@ -39,7 +39,7 @@ def without_conditions(tree: Tree) -> Tree:
 
 
 def failed_condition(tree: Tree, substitution: Substitution) -> Entry | None:
-    """Return the condition because of which an entry is left out; None if it stays.
+    """Return the condition that leaves out an entry; None if the entry stays.
 
     An entry stays as well if its condition cannot be evaluated.
     """

@@ -85,7 +85,7 @@ class _LocatedError(SchemaError):
 
     @property
     def owner_span(self) -> Span:
-        """The location of the value or its key; for a whole file, that of its first key."""
+        """The location of the value or its key; for a whole file, of its first key."""
         first = next(iter(self.index.root), None)
         if not self.path and first is not None:
             return first.key.span

@@ -171,7 +171,7 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
 
 
 def _isolation(port: Mapping, node: Mapping) -> Isolation:
-    """Return whether messages are copied: those of a class are, since it may use them again."""
+    """Return whether messages are copied: a class may use its messages again, so they are."""
     usual = Isolation.SHARE if node.get("class") is None else Isolation.COPY
     return value_or(choice(port.get("isolation"), Isolation), usual)
 

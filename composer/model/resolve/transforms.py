@@ -47,7 +47,7 @@ def read_transforms(entry: Entry | None) -> Transforms | None:
 
 
 def merged_transforms(declared: Entry | None, given: Entry) -> Entry:
-    """Return the frames of a node type with those of an instance, which replace them one by one."""
+    """Return the frames of a node type; frames of the instance replace them one by one."""
     if declared is None or not isinstance(given.value, Mapping):
         return given
     kept = {item.name: item for item in entries(declared.value)}

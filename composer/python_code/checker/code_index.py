@@ -71,7 +71,7 @@ class CodeIndex:
 
     @cached_property
     def alternatives(self) -> frozenset[str]:
-        """Names that several imports or classes bind, of which a condition may select one."""
+        """Names that several imports or classes bind: a condition may select one of them."""
         counts = Counter(node.name for node in self.classes)
         several = (name for name, count in counts.items() if count > 1)
         return frozenset({*self.module.alternatives, *several})
@@ -85,7 +85,7 @@ class CodeIndex:
 
     @cached_property
     def tested(self) -> frozenset[str]:
-        """Names of which ``hasattr`` asks for an attribute."""
+        """The names whose attributes ``hasattr`` asks for."""
         tests = (call for call in self._calls if dotted(call.func) == "hasattr" and call.args)
         return frozenset(dotted(call.args[0]) for call in tests)
 

@@ -54,7 +54,7 @@ class Copy:
 
 
 def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool) -> Copy:
-    """Return the copy of a file. ``classes`` are its classes with a known surrounding."""
+    """Return the copy of a file for the checker; ``classes`` has edits by the name of a class."""
     edits = _Edits(module.source.text.split("\n"))
     edits.import_interfaces(module.tree)
     names: set[str] = set()

@@ -55,7 +55,7 @@ class ClassEdit:
 
 @dataclass(frozen=True, slots=True)
 class CheckedFile:
-    """A file, and the node and class because of which it is checked."""
+    """A file, and the node and class that it is checked for."""
 
     content: Module | BrokenModule
     node: Node

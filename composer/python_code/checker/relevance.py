@@ -54,7 +54,8 @@ class Relevance:
     """Decides about the findings in one file.
 
     ``reassigned`` are the names and own attributes that get values of several types, ``attributes``
-    those that any class of the project defines, ``classes`` their names, ``messages`` those of ROS.
+    those that any class of the project defines, ``classes`` their names, ``messages`` the messages
+    of ROS.
     """
 
     code: CodeIndex

@@ -93,7 +93,7 @@ def _incomplete_profiles(scope: NodeScope) -> Iterator[Problem]:
 
 
 def _missing_calls(code: Code) -> Iterator[Problem]:
-    """Yield the methods that do not call those of their base class, and wrong transitions."""
+    """Yield the methods that do not call the base class's method, and wrong transitions."""
     has_publishers = any(
         isinstance(node, ast.Attribute) and node.attr == "create_lifecycle_publisher"
         for scope in code.scopes

@@ -147,7 +147,7 @@ def reaction_expressions(reaction: Reaction) -> Iterator[tuple[Expression, Span]
 
 
 def _goal_expressions(port: Port) -> Iterator[tuple[Expression, Span]]:
-    """Yield the expressions of an action server other than those of its reactions."""
+    """Yield the expressions of an action server that are not in its reactions."""
     if port.accept is not None:
         yield port.accept, port.accept_span or port.span
     steps = port.feedback.content if port.feedback is not None else None

@@ -187,7 +187,7 @@ def frame_trees(context: Context) -> tuple[FrameTree, ...]:
 
 
 def complete_trees(context: Context) -> Iterator[FrameTree]:
-    """Yield the trees of which all frames are known, so that a missing one is an error."""
+    """Yield the trees whose frames are all known, so that a missing frame is an error."""
     errors = context.once(earlier_errors)
     system = context.system
     if errors.any or system.node_type or not all(node.complete for node in system.nodes):

@@ -34,7 +34,7 @@ _ENTRIES = ("on_", "accept_")
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """A callback that publishes: that of a timer or of a port."""
+    """The callback of a timer or port that publishes."""
 
     timer: Timer | None = None
     port: Port | None = None

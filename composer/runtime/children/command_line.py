@@ -78,7 +78,7 @@ def _names(node: Node) -> Iterator[str]:
 
 
 def remappings(node: Node) -> Iterator[str]:
-    """Yield the remapping rules of a node: those of its ports, then those without a port."""
+    """Yield the remapping rules of a node: first of its ports, then of other names."""
     name, namespace = node.ros_name.value, node.namespace.value
     remapped: set[str] = set()
     for port in node.ports:
@@ -132,7 +132,7 @@ def _program(executable: Executable, environment: Mapping[str, str]) -> tuple[st
 
 
 def _folder(executable: Executable) -> Path | None:
-    """Return the working directory; None for that of this process."""
+    """Return the working directory; None for the directory of this process."""
     if executable.working_directory is None:
         return executable.folder.absolute() if executable.command else None
     return (executable.folder / Path(executable.working_directory.value).expanduser()).absolute()

@@ -74,7 +74,7 @@ class OutputLines:
 
 
 def process_loggers(process: str, nodes: Iterable[str]) -> tuple[str, ...]:
-    """Return the names that a process of a system may log with: its own, and those of its nodes.
+    """Return the names that a process of a system may log with: its own, and its nodes'.
 
     ``nodes`` are full names. What the composer logs in the process is not among them, because
     classes in the process can print the same: it has the name of the process.

@@ -80,7 +80,7 @@ class _CountSource(_EventSource):
         self._is_first = True
 
     def take(self) -> bool | None:
-        """Return true for each signal but the first, which is that of the group."""
+        """Return true for each signal but the first, which is the signal of the group."""
         if self._is_first:
             self._is_first = False
             return None

@@ -131,7 +131,7 @@ def _traceback(error: BaseException, *, all_frames: bool) -> str:
 
 
 def _keep_user_frames(full: traceback.TracebackException) -> bool:
-    """Remove the composer's frames, also those of causes; return whether any frame is left."""
+    """Remove the composer's frames, of causes too; return whether any frame is left."""
     pending = [full]
     has_frames = False
     while pending:

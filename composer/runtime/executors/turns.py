@@ -47,7 +47,7 @@ class Turn:
 
 
 class TurnTaking(BaseLoop):
-    """The threads of a loop, of which one has the turn."""
+    """The threads of a loop: one of them has the turn."""
 
     def __init__(
         self,
@@ -145,9 +145,9 @@ class TurnTaking(BaseLoop):
         return self._slots is not None
 
     def overlap(self) -> None:
-        """Let another thread serve a loop of several threads from now on, in a callback.
+        """Wait until a callback may begin, then let another thread of the loop have the turn.
 
-        Waits until the callback may begin. Without effect on a thread that has no turn.
+        Does nothing if the loop has one thread, or this thread does not have the turn.
         """
         if self._slots is not None and self._has_turn() and not self._stopping:
             self._slots.get()

@@ -201,7 +201,7 @@ class Instance(UserCode):
         return PermittedFunction(self, callback, context, group, entity)
 
     def timer_name(self, callback: object) -> str:
-        """Return a name for a timer that has no other one: that of its callback."""
+        """Return a name for a timer that has none: the name of its callback."""
         name = "rate" if callback is None else name_of(callback).rpartition(".")[2]
         names = (name if number == 1 else f"{name}_{number}" for number in count(1))
         free = next(name for name in names if name not in self.timer_names)

@@ -104,7 +104,7 @@ def unsupported_reason(context: Context | None = None) -> str | None:
 
 
 def _self_test(node: Node) -> None:
-    """Publish to two subscriptions, one of which ignores it. Raises NotSupported."""
+    """Publish to two subscriptions, and expect that one of them ignores it. Raises NotSupported."""
     profile = QoSProfile(depth=2, reliability=ReliabilityPolicy.RELIABLE)
     topic = f"{_TEST_NODE}/t{uuid4().hex}"
     ignoring = node.create_subscription(Empty, topic, lambda _: None, profile)

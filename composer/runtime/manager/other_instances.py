@@ -69,7 +69,7 @@ class OtherInstances:
     ) -> None:
         """Add the service to the manager node, which ``loop`` serves, and start to check.
 
-        ``changes`` are those of the ROS graph that the manager node discovers.
+        ``changes`` are the changes of the ROS graph that the manager node discovers.
         ``on_older(instance)`` is called while this system starts, for an instance that started
         before; ``on_permanent(instance)`` once for each instance that has passed that time.
         """

@@ -40,20 +40,20 @@ class KeptGoals:
             with suppress(OSError):
                 write_whole(self._path, encode(new))
 
-    def found(self) -> tuple[Mapping[str, PrimaryState], str] | None:
-        """Return the goals by the keys of nodes, and the activity; None if there are none."""
+    def read(self) -> tuple[Mapping[str, PrimaryState], str] | None:
+        """Return the goals by the keys of nodes, and the activity; None if no file has them."""
         if self._path is None:
             return None
         try:
-            found = decode(self._path.read_text(encoding="utf-8"), SystemGoals)
+            kept = decode(self._path.read_text(encoding="utf-8"), SystemGoals)
         except (OSError, ValueError):
             return None
         goals = {
-            name: found.goals[full_name]
+            name: kept.goals[full_name]
             for name, full_name in self._names.items()
-            if full_name in found.goals
+            if full_name in kept.goals
         }
-        return goals, found.activity
+        return goals, kept.activity
 
     def forget(self) -> None:
         """Let the next coordinating process start the system as if it were the first one."""

@@ -118,7 +118,7 @@ class OtherProcesses:
         None if it has left no nodes inactive or active: then the system is to be started.
         """
         has_kept_nodes = any(process.has_kept_nodes for process in self._all)
-        return self._goals.found() if has_kept_nodes else None
+        return self._goals.read() if has_kept_nodes else None
 
     def keep_goals(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
         """Keep the goals of the system, by the keys of its nodes, and its activity."""

@@ -163,7 +163,7 @@ class MemberProcess:
             starting.set_result(None)
 
     def request(self, node: str, transition: str, after: Sequence[str] = ()) -> Future[StepResult]:
-        """Request a transition of a node, after those of others; return the future of its result.
+        """Request a transition of a node, after requests for others; return its future result.
 
         Raises ProcessUnavailable if the process does not run; so does the future if it ends.
         """

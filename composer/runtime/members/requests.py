@@ -203,7 +203,7 @@ class MemberRequests:
         self._send()
 
     def _is_ready(self) -> bool:
-        """Return whether the service is there, and is that of the process that has reported."""
+        """Return whether the service is there, and belongs to the process that has reported."""
         if not self._client.service_is_ready():
             return False
         if not self._is_discovered:

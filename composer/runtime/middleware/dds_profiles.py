@@ -63,7 +63,7 @@ def is_own_profile(environment: Mapping[str, str]) -> bool:
 
 
 def is_default_profile(environment: Mapping[str, str]) -> bool:
-    """Say whether the profile is that of :func:`use_discovery_profile`."""
+    """Return whether :func:`use_discovery_profile` has set the profile."""
     return environment.get(PROFILES_VARIABLE) == str(_PROFILE)
 
 

@@ -113,7 +113,7 @@ def _refusal(path: Path, why: str) -> StartRefused:
 
 
 def _description(status: os.stat_result) -> str:
-    """Say what a file is that is not a segment of this user."""
+    """Describe a file that is not a segment of this user."""
     kind = "incomplete shared memory of Fast DDS"
     if not stat.S_ISREG(status.st_mode):
         kind = "not shared memory, but named like a port of Fast DDS"

@@ -53,7 +53,7 @@ class NodeEntities(PortSet):
 
     @property
     def ports(self) -> Iterator[RunningPort]:
-        """All of them."""
+        """All ports, timers and entities of libraries."""
         yield from super().ports
         yield from self.of_libraries.ports
 

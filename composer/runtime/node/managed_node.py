@@ -203,11 +203,11 @@ class ManagedNode(ABC):
         """Block all ports of a failed node until its next transition."""
 
     def limit_end(self, end_s: float) -> None:
-        """Know that the system shuts down and that nothing may last longer than ``end_s``."""
+        """Let nothing last longer than ``end_s``: the system shuts down."""
 
     def keep_entities(self) -> None:
         """Do not destroy ports from now on: the end of the process does."""
 
     @abstractmethod
     def destroy(self) -> None:
-        """Destroy the node in any state, on its loop or once that has stopped."""
+        """Destroy the node in any state, on its loop, or after the loop has stopped."""

@@ -52,15 +52,15 @@ class PortSet:
 
     @property
     def ports(self) -> Iterator[RunningPort]:
-        """All of them."""
+        """All ports and timers."""
         return iter(tuple(self._ports.values()))
 
     @property
     def gated(self) -> Iterator[RunningPort]:
-        """Those that work only while the node is active."""
+        """The ports and timers that work only while the node is active."""
         return (port for port in self.ports if port not in self._always_on)
 
     @property
     def always_on(self) -> tuple[RunningPort, ...]:
-        """The others."""
+        """The ports and timers that work while the node is inactive, too."""
         return tuple(port for port in self.ports if port in self._always_on)

@@ -177,7 +177,7 @@ class QosEvents:
         return []
 
     def activate(self) -> None:
-        """Count events from now on, and those that take a period after that period."""
+        """Count events from now on; events that take a period, after one period."""
         self._active_since_s = self._context.loop.clock.monotonic()
 
     def publisher_limits(self) -> tuple[Target, ...]:

@@ -27,7 +27,7 @@ class NodeReport:
     services that the manager node has instead (see :class:`composer.model.Introspection`).
     ``process`` is the process of the system that the node runs in, empty for the one that reports.
     ``pid`` is the id of the operating system's process, empty while none runs or it is not known,
-    and ``host`` its computer, empty for that of the process that reports.
+    and ``host`` its computer, empty for the computer of the process that reports.
 
     Rates are in hertz from burst to burst of the last seconds; ``busy`` is the share of a thread
     that its callbacks took in the last second. They are None if they are not known, as of an

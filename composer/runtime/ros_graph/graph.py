@@ -95,13 +95,13 @@ class RosGraph:
         return tuple(sorted(found))
 
     def others(self) -> tuple[NodeName, ...]:
-        """Return name and namespace of every known node except those of commands."""
+        """Return the name and namespace of every discovered node, except nodes of commands."""
         return tuple(
             sorted(node for node in self.nodes() if not node[0].startswith(COMMAND_PREFIX))
         )
 
     def participants(self) -> frozenset[bytes]:
-        """Return the prefixes of all discovered participants, including that of the node.
+        """Return the prefixes of all discovered participants, including the node's own.
 
         Publishers and subscriptions are announced separately; a participant counts with both.
         """

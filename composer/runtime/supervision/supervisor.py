@@ -85,7 +85,7 @@ class Supervisor:
     ) -> None:
         """Change the goals of nodes, except of those moved on request since a serial number.
 
-        ``activity`` is that of the system with these goals; by default, it does not change.
+        ``activity`` is the activity of the system with these goals; by default, it does not change.
         """
 
         def change(desired: DesiredState) -> DesiredState:
@@ -182,7 +182,7 @@ class Supervisor:
     ) -> None:
         """Handle events and due restarts until a stop is requested, ``end_s``, or ``until()``.
 
-        Without ``run_command``, the first command in the queue ends this, too.
+        Without ``run_command``, the first command in the queue also ends the run.
         """
         while not (self._main_queue.stopping or self._clock.monotonic() >= end_s or until()):
             now_s = self._clock.monotonic()
@@ -202,7 +202,7 @@ class Supervisor:
                 self.handle(item)
 
     def handle(self, event: NodeEvent) -> None:
-        """Handle one event, and those of its kind that follow: many nodes may fail at once."""
+        """Handle an event, and events of its kind that follow: many nodes may fail at once."""
         match event:
             case Fault() as fault:
                 self._faults.handle([fault, *self._main_queue.take_next(Fault)])

@@ -1,4 +1,4 @@
-"""Transforms in messages: those of tf2, and poses.
+"""Transforms in messages of tf2 and in poses.
 
 Message packages are imported when they are used: few systems have transforms.
 """

@@ -85,7 +85,7 @@ class ServerInProcess(Generic[S]):
 
 
 class HostedClient(Client):
-    """The client that the class uses: rclpy's, whose class is replaced by this one.
+    """The client that the class uses: rclpy's object, with this class in place of its own.
 
     It calls in every transition and while the node is active.
     """
@@ -145,7 +145,7 @@ class HostedClient(Client):
 
 
 class HostedFuture(RclpyFuture):
-    """The future of a call: rclpy's, whose class is replaced by this one.
+    """The future of a call: rclpy's object, with this class in place of its own.
 
     Exceptions of its callbacks are errors of the node.
     """

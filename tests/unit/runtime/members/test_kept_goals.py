@@ -21,26 +21,26 @@ def goals_of(path: Path | None, nodes: str = "arm: {}, eye: {}") -> KeptGoals:
 def test_goals_are_kept_until_the_system_is_shut_down(tmp_path: Path) -> None:
     path = tmp_path / "robot.goals"
     goals = goals_of(path)
-    assert goals.found() is None
+    assert goals.read() is None
     goals.keep(BOTH, "running")
     goals.keep(BOTH, "paused")
-    assert goals_of(path).found() == (BOTH, "paused")
+    assert goals_of(path).read() == (BOTH, "paused")
     goals.forget()
     goals.forget()
-    assert goals_of(path).found() is None
+    assert goals_of(path).read() is None
 
 
 def test_nodes_that_are_gone_do_not_count(tmp_path: Path) -> None:
     path = tmp_path / "robot.goals"
     goals_of(path).keep(BOTH, "running")
-    assert goals_of(path, "eye: {}, leg: {}").found() == ({"eye": INACTIVE}, "running")
+    assert goals_of(path, "eye: {}, leg: {}").read() == ({"eye": INACTIVE}, "running")
 
 
 @pytest.mark.parametrize("text", ["", "{}", "\xff", '{"version": 0, "type": "x", "content": {}}'])
 def test_a_file_that_cannot_be_read_does_not_count(text: str, tmp_path: Path) -> None:
     path = tmp_path / "robot.goals"
     path.write_text(text, encoding="latin-1")
-    assert goals_of(path).found() is None
+    assert goals_of(path).read() is None
 
 
 def test_without_a_folder_nothing_is_kept(tmp_path: Path) -> None:
@@ -48,4 +48,4 @@ def test_without_a_folder_nothing_is_kept(tmp_path: Path) -> None:
         goals = goals_of(path)
         goals.keep(BOTH, "running")
         goals.forget()
-        assert goals.found() is None
+        assert goals.read() is None
