@@ -29,17 +29,17 @@ def check_kind(
     if kind in allowed:
         return None
     entry = (tree.entry(kind) if kind is not None else None) or next(iter(tree), None)
-    expected = " or ".join(_WORDS[name] for name in allowed)
     if kind is None:
-        message = f"'{source.path}' is neither a system nor a node type"
+        message = f"'{source.path}' is not a system, a node type or a scenario"
     else:
+        expected = " or ".join(_WORDS[name] for name in allowed)
         message = f"'{source.path}' is {_WORDS.get(kind, kind)}, not {expected}"
-    keys = " or ".join(f"'{name}: <name>'" for name in allowed)
+    possible = _WORDS if kind is None and len(allowed) > 1 else allowed
     return Diagnostic(
         RULE,
         message,
         entry.key.span if entry is not None else tree.span,
-        hint=f"{expected} begins with {keys}",
+        hint=", ".join(f"{_WORDS[name]} begins with '{name}: <name>'" for name in possible),
     )
 
 

@@ -171,13 +171,13 @@ def test_a_variable_without_value_makes_nothing_wrong() -> None:
     assert len(relay.timers) == 1
 
 
-def test_a_file_of_neither_kind_has_a_diagnostic(tmp_path: Path) -> None:
+def test_a_file_of_no_kind_has_a_diagnostic(tmp_path: Path) -> None:
     source = SourceFile("compose.yaml", "nodes: {}\n")
     tree, _ = parse_document(source)
     assert tree is not None
     system, (diagnostic,) = resolve(tree, source, NodeTypes.of(Project.at(tmp_path)))
     assert system is None
-    assert diagnostic.message == "'compose.yaml' is neither a system nor a node type"
+    assert diagnostic.message == "'compose.yaml' is not a system, a node type or a scenario"
     assert quoted(diagnostic.primary) == "nodes"
 
 
