@@ -74,7 +74,7 @@ def test_the_budget(
         (", then: shutdown", OnFailure.SHUTDOWN),
     ],
 )
-def test_a_node_without_restarts_left_is_given_up_alone_unless_told_otherwise(
+def test_a_node_without_restarts_left_is_given_up_alone_unless_then_is_shutdown(
     then: str, action: OnFailure
 ) -> None:
     system = robot(f"{{on_failure: restart, restart: {{max_attempts: 1{then}}}}}")
