@@ -54,6 +54,8 @@ _WORDS = {
 }
 #: A cell of a table has the first sentence, and further ones up to this number of words.
 _WORDS_IN_CELL = 18
+#: Keys of many maps, in the tables of the first maps that have them; the introduction names them.
+_EVERYWHERE = ("description", "for_each", "if", "unless")
 _SUBSTITUTION = r"\$\{"
 _EXPRESSION = r"\{"
 
@@ -196,6 +198,13 @@ class Details:
     """What the cells of the tables leave out: below the first table that has the key."""
 
     headings: dict[tuple[str, str], str] = field(default_factory=dict)
+    rows: set[str] = field(default_factory=set)
+
+    def has_shown(self, row: str) -> bool:
+        """Return whether an earlier table has the row; note it."""
+        has_shown = row in self.rows
+        self.rows.add(row)
+        return has_shown
 
     def lines(self, heading: str, texts: dict[str, str]) -> Iterator[str]:
         """Yield a list of the texts by key, and where the ones are that an earlier section has."""
@@ -243,7 +252,10 @@ def _rendered(section: Section, document: Schema, details: Details) -> str:
     for key, part in section.part["properties"].items():
         described = document.described(part)
         cell, text = _cell_and_details(described.get("description", "").strip())
-        lines.append(_row(key, part, cell, section, document))
+        row = _row(key, part, cell, section, document)
+        if key in _EVERYWHERE and details.has_shown(row):
+            continue
+        lines.append(row)
         if text:
             texts[key] = text
     if texts:
