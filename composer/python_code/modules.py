@@ -175,9 +175,13 @@ class NearbyModules:
 
     @property
     def hint(self) -> str | None:
-        """The name that was most likely meant, as a hint; also one that is installed."""
+        """The name that was most likely meant, as a hint; also one that is installed.
+
+        Python's own modules have no classes of nodes.
+        """
         installed = () if self.package else _modules_in(map(Path, sys.path))
-        close = self.similar or nearest(self.missing, [name for name, _ in installed])
+        names = [name for name, _ in installed if name not in sys.stdlib_module_names]
+        close = self.similar or nearest(self.missing, names)
         return f"did you mean '{close}'?" if close is not None else None
 
 

@@ -57,6 +57,13 @@ def folder(tmp_path: Path) -> Path:
             "expected zzz/node.py next to the YAML file, among the node types, or on Python's"
             " module search path",
         ),
+        (  # not 'tkinter', which has no nodes
+            "talker:Camera",
+            "not-installed",
+            "module 'talker' is not found on this computer, so its class is not checked",
+            "expected talker.py next to the YAML file, among the node types, or on Python's"
+            " module search path",
+        ),
     ],
 )
 def test_a_missing_module_is_reported_with_the_nearest_name(
