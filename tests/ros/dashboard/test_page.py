@@ -78,7 +78,7 @@ def test_every_view_has_an_address_and_a_key(view: Page) -> None:
     view.goto("/nodes?show=plan")
     expect_text(view.locator("tbody tr"), "planner.*configure")
     view.go_back()
-    view.wait_for_url("**/bags")
+    view.wait_for_url(f"**/{VIEWS[-1]}")
     visit(view, "/timing")
     expect_text(view.locator("tbody tr"), "timer control")
     view.click("tbody a:has-text('timer control')")
