@@ -292,6 +292,7 @@ def _no_word_of(error: _LocatedError, words: list[str]) -> Iterator[Diagnostic]:
     message = f"expected {_any_of(words)}{error.subject}, found {found}"
     close = nearest(error.instance, words) if isinstance(error.instance, str) else None
     hint = f"did you mean '{close}'?" if close is not None else None
+    hint = hint or value_advice(error.path, error.instance)
     yield Diagnostic(rules.UNKNOWN_WORD, message, error.value_span, hint=hint)
 
 

@@ -115,6 +115,10 @@ def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
 def value_advice(path: Sequence[str | int], value: object) -> str | None:
     """Return the hint for a ``value`` of the wrong type at ``path``, or None."""
     *_, parent, key = ("", "", *path)
+    if key == "lifecycle" and value in ("managed", "none"):
+        return "write it in 'executable', 'component' or 'external' of the node"
+    if key == "lifecycle" and isinstance(value, dict):
+        return f"write these settings in 'lifecycle' of the node, next to '{parent}'"
     if parent == "parameters" and isinstance(value, dict) and value:
         return f"write a nested name with a dot: '{key}.{next(iter(value))}: ...'"
     items = value if isinstance(value, list) else [value]

@@ -80,6 +80,14 @@ def profile(text: str) -> str:
             node("{type: relay, parameters: robot.yaml}"),
             "wrong-type", "robot.yaml", "expected a map for 'parameters'", "'parameter_files'",
         ),
+        (
+            node("{lifecycle: managed}"),
+            "wrong-type", "managed", "expected a map for 'lifecycle'", "write it in 'executable'",
+        ),
+        (
+            node("{executable: {command: [a], lifecycle: {depends_on: [b]}}}"),
+            "unknown-word", "{", "expected 'managed' or 'none' for 'lif", "next to 'executable'",
+        ),
         (node(""), "wrong-type", "robot", "expected a map for 'robot', found nothing", "'{}'"),
         (
             node("{typ: relay, variables: {a: 1}, publishers: {a: {}}}"),
