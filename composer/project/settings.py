@@ -161,7 +161,9 @@ def _folders(
                 replace(BAD_SETTING, severity=Severity.WARNING) if is_missing else BAD_SETTING,
                 f"'{shown(text.value)}' {problem}",
                 text.span,
-                hint=_similar(folder) if is_missing else "use a folder below that of this file",
+                hint=_similar(folder)
+                if is_missing
+                else "use a folder below the folder of this file",
                 subjects=() if is_missing else (("folder", name),),
             )
         )

@@ -153,7 +153,7 @@ def check_executor_outside_process(context: Context) -> Iterator[Diagnostic]:
             f"but process '{process.name}' only on {_cpu_text(process.cpus)}",
             executor.name.span,
             (Label(process.name.span, "the process"),),
-            "add them to 'cpus' of the process, or change those of the executor",
+            "add them to 'cpus' of the process, or change 'cpus' of the executor",
         )
 
 

@@ -186,5 +186,5 @@ def check_many_services(context: Context) -> Iterator[Diagnostic]:
             f"the nodes have about {sum(found)} endpoints for tools: their processes may not start "
             "within the time limit",
             system.name.span,
-            hint="disable those that no tool uses, in 'introspection' of the system",
+            hint="disable what no tool uses, in 'introspection' of the system",
         )

@@ -253,7 +253,7 @@ def _report(done: Replay, golden: Bag | None, limits: Tolerances) -> None:
         return
     found = done.differences(golden, limits)
     if not found:
-        write(f"{counts}, which are equal to those of the bag")
+        write(f"{counts}, equal to the messages of the bag")
         return
     write(lines(map(str, found)))
     raise typer.Exit(FAILED)

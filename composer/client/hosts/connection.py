@@ -68,7 +68,7 @@ async def connect(host: Host, root: Path) -> asyncssh.SSHClientConnection:
         known = f" -o UserKnownHostsFile={host.known_hosts}" if host.known_hosts else ""
         raise HostError(
             host,
-            "its host key is unknown, or not the one that is known",
+            "its host key is unknown, or has changed",
             f"log in once, and compare the fingerprint: ssh{port}{known} {host.login}",
         ) from error
     except asyncssh.PermissionDenied as error:

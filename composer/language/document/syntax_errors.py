@@ -186,7 +186,9 @@ def _among_items(problem: _Problem) -> Diagnostic | None:
         return None
     list_begins = problem.context_label("the list begins here")
     hint = "begin it with '- ', or indent it as what it belongs to"
-    return problem.at_error("this line stands in a list and is no item of it", hint, list_begins)
+    return problem.at_error(
+        "this line is in a list, but is not an item of the list", hint, list_begins
+    )
 
 
 def _cannot_start(problem: _Problem) -> Diagnostic | None:

@@ -237,7 +237,7 @@ def _system_conflicts(own: Mapping, parts: list[Part]) -> Iterator[Diagnostic]:
             theirs, ours = _setting(part.tree, path), _setting(own, path)
             if theirs is None or theirs.value == (usual if ours is None else ours.value):
                 continue
-            message = f"'{path[-1]}' of an included file differs from that of the system"
+            message = f"'{path[-1]}' of an included file differs from the value in the system"
             labels = (Label(ours.span, "the system's"),) if ours is not None else ()
             hint = f"set '{'.'.join(path)}' only in the including file"
             yield Diagnostic(INVALID_INCLUDE, message, theirs.span, labels, hint)

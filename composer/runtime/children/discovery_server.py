@@ -149,7 +149,7 @@ def discovery_servers(
         listed = ", ".join(host for host, _ in discovery.servers)
         raise StartRefused(
             f"the discovery server cannot be started here: this computer is not {listed}",
-            "set its 'address' to one of those that 'ip address' lists, or 'start: false'",
+            "set its 'address' to one that 'ip address' lists, or set 'start: false'",
         )
     try:
         if _outlast_lost(ours, wait_until):

@@ -21,7 +21,7 @@ def start_refused(error: Exception) -> StartRefused:
     if "security libraries" in text:
         text = "security is enabled, but this build of Fast DDS has no security libraries"
         hint = (
-            "use one that has, such as that of ROS 2 Jazzy from packages.ros.org, or unset"
+            "use a build with them, such as ROS 2 Jazzy from packages.ros.org, or unset"
             " ROS_SECURITY_ENABLE"
         )
     return StartRefused(f"ROS does not start: {text}", hint)

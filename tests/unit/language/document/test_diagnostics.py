@@ -62,7 +62,7 @@ def located(diagnostic: Diagnostic) -> str:
         ("a: 1\n- b", "f:2:1 a list item stands among keys", "under the key it belongs to"),
         ("a: [b]]", "f:1:7 this ']' closes nothing", "delete it"),
         ('a: "x" y', "f:1:8 this stands behind a finished value", "whole text in quotes"),
-        ("- a\nb: 1", "f:2:1 this line stands in a list and is no item of it", "'- '"),
+        ("- a\nb: 1", "f:2:1 this line is in a list, but is not an item of the list", "'- '"),
         ("a: @x", "f:1:4 a value cannot start with '@'", "whole text in quotes"),
         ("a: `x`", "f:1:4 a value cannot start with '`'", "whole text in quotes"),
         ("a: %x", "f:1:4 a value cannot start with '%'", "whole text in quotes"),
