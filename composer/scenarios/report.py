@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
+from composer.base.characters import escape_line, escape_lines
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.report.text import excerpt, render
@@ -17,7 +18,7 @@ _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run of a scenario in the file ``path``.
+    """One run of a scenario in a file, with ``path`` as text for one line.
 
     ``errors`` are diagnostics of the file, because of which it was not run; ``result`` is then
     None. ``for_s`` is how long the run lasts in the time of the system.
@@ -57,15 +58,17 @@ def details(case: Case, *, color: bool = False) -> str:
         lines += [f"  expected: {failure.expected}", f"  seen:     {_indented(failure.seen)}"]
         blocks.append("\n".join(lines))
     if case.result.timeline:
-        blocks.append("\n".join(["the last events before:", *case.result.timeline]))
+        events = map(escape_line, case.result.timeline)
+        blocks.append("\n".join(["the last events before:", *events]))
     blocks += case.result.recorded
     if case.result.output:
-        blocks.append(f"output of the process:\n{case.result.output.rstrip()}")
+        lines = escape_lines(case.result.output.rstrip()).split("\n")
+        blocks.append("\n".join(["output of the process:", *(f"  | {line}" for line in lines)]))
     return "\n".join(blocks)
 
 
 def _indented(text: str) -> str:
-    return text.replace("\n", "\n            ")
+    return escape_lines(text).replace("\n", "\n            ")
 
 
 def summary(cases: Sequence[Case], took_s: float) -> str:

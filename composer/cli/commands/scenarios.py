@@ -231,6 +231,7 @@ def _run(
     ``bags`` is a folder for a bag of each failed run. If a run of several fails, the bag of the
     first one that has passed is kept as well, to be compared with.
     """
+    from composer.base.characters import escape_line
     from composer.base.diagnostics import Severity
     from composer.scenarios.processes import Job
     from composer.scenarios.report import Case
@@ -247,7 +248,7 @@ def _run(
                 jobs.append(Job(result.scenario, result.system, bag))
     outcomes = zip(jobs, run_all(jobs), strict=True)
     for result in results:
-        path, scenario = result.source.path, result.scenario
+        path, scenario = escape_line(result.source.path), result.scenario
         if not result.is_runnable or scenario is None:
             errors = [item for item in result.diagnostics if item.severity is Severity.ERROR]
             yield Case(path, _name(result), errors=errors)

@@ -18,7 +18,7 @@ from composer.behavior import Behavior
 
 class Crashing(Behavior):
     def on_tick(self) -> None:
-        print("going down")
+        print("going down\\x1b[2J\\r\\n[FATAL] [compose] forged")
         os.abort()
 
 
@@ -59,7 +59,7 @@ def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
     for name in ("Crashing", "Hanging"):
         _write(tmp_path, f"{name}.yaml", SYSTEM.replace("NAME", name))
         scenario = f"scenario: {name}\nsystem: ../{name}.yaml\nfor_s: 1\n"
-        _write(tmp_path, f"scenarios/{name}.yaml", scenario)
+        _write(tmp_path, f"scenarios/{name}\n[FATAL] [compose] \udcff\x1b.yaml", scenario)
     words = ("--timeout", "3", "-j2", "--junit", "out/j.xml", "--bag-on-failure")
     done = _command(tmp_path, "composer", "test", *words)
     assert done.returncode == 1
@@ -71,6 +71,10 @@ def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
     assert "still running at the time limit" in hung.message
     assert "in on_tick" in hung.text
     assert "2 failed" in done.stderr
+    assert "  | going down\\x1b[2J\\r\n  | [FATAL] [compose] forged\n" in done.stdout
+    assert "/Hanging\\n[FATAL] [compose] \\udcff\\x1b.yaml: Hanging failed\n" in done.stdout
+    assert not any(line.startswith("[FATAL]") for line in done.stdout.splitlines())
+    assert done.stdout.replace("\n", "").isprintable()
     [folder] = (tmp_path / "bags").iterdir()
     for name in ("1-Crashing", "2-Hanging"):
         assert f"recorded until the process ended: bags/{folder.name}/{name}" in done.stdout
