@@ -19,7 +19,10 @@ from typing import TYPE_CHECKING
 from composer.base.diagnostics import nearest
 from composer.model.hosts import HIGHEST_DOMAIN_ID, domain_problem
 from composer.runtime.middleware.dds_profiles import use_discovery_profile
-from composer.runtime.middleware.shared_memory import remove_incomplete_ports
+from composer.runtime.middleware.shared_memory import (
+    remove_dead_segments,
+    remove_incomplete_ports,
+)
 from composer.runtime.process import StartRefused
 from composer.runtime.process.instance_lock import local_discovery
 
@@ -151,7 +154,7 @@ def complete_environment(environment: MutableMapping[str, str]) -> None:
 
 
 def prepare_environment(discovery: Discovery | None = None) -> None:
-    """Check and complete the environment, and remove incomplete shared memory.
+    """Check and complete the environment, and remove what killed processes left in shared memory.
 
     ``discovery`` is that of the system that this process runs. Raises StartRefused. Call it before
     rclpy is imported: the import ends the process if the middleware does not exist.
@@ -161,6 +164,7 @@ def prepare_environment(discovery: Discovery | None = None) -> None:
     use_discovery(discovery, os.environ)
     check_environment(os.environ)
     remove_incomplete_ports(int(os.environ.get("ROS_DOMAIN_ID") or 0))
+    remove_dead_segments()
 
 
 def _check_domain_id(environment: Mapping[str, str]) -> None:

@@ -1,18 +1,23 @@
-"""Shared memory: how much is free; removes what killed processes left and would hang new ones.
+"""Shared memory: how much is free; removes what killed processes left.
 
 Fast DDS opens or creates a shared memory segment for each port. If a process is killed between
 creating and filling it, every later participant that opens it waits in its constructor forever,
 without reacting to signals: see boost/interprocess/detail/managed_open_or_create_impl.hpp. A FIFO
 of that name has the same effect. Every local user can create such files, so owner and type of each
 are checked, and only segments of this user are removed.
+
+A process also has a segment for its messages, and locks a file next to it until it ends. Nothing
+else removes the segment of a killed one: each kill would take 0.5 or 16 MB until the next boot.
 """
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 from composer.runtime.clock.clock import COMPUTER
@@ -27,6 +32,10 @@ LARGE_SEGMENT_BYTES = 16 * MEGABYTE
 #: Such a process needs that much: its other segments, and those of other processes, take the rest.
 MIN_FREE_BYTES = 2 * LARGE_SEGMENT_BYTES
 _PORT = re.compile(r"fastrtps_port(\d{1,9})", re.ASCII)
+_SEGMENT = re.compile(r"fastrtps_[0-9a-f]{16}", re.ASCII)
+_LOCK = "_el"  # the end of the name of its lock file
+#: A process locks the file right after it has created it.
+_LOCKED_WITHIN_S = 10.0
 #: As shm_open(3) opens it for a participant, and without waiting for the other end of a FIFO.
 _OPEN = os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
 #: The first word of a segment: uninitialized, initializing. 2 means initialized.
@@ -43,12 +52,8 @@ def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> Non
     Wait up to a second for segments that a process may be filling. Raises StartRefused if one in
     the domain would hang a participant and is not a segment of this user.
     """
-    if not folder.is_dir():
-        return
     ports = ports_of_domain(domain_id)
-    with os.scandir(folder) as entries:
-        names = sorted(entry.name for entry in entries)
-    for port in filter(None, map(_PORT.fullmatch, names)):
+    for port in filter(None, map(_PORT.fullmatch, _names(folder))):
         path = folder / port[0]
         status = _status(path)
         if status is None:
@@ -60,9 +65,30 @@ def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> Non
             _remove(path)
 
 
+def remove_dead_segments(folder: Path = SHARED_MEMORY) -> None:
+    """Remove the segments of this user whose processes were killed."""
+    for name in filter(_SEGMENT.fullmatch, _names(folder)):
+        lock = folder / f"{name}{_LOCK}"
+        with suppress(OSError), os.fdopen(os.open(lock, _OPEN), "rb", buffering=0) as file:
+            status = os.fstat(file.fileno())
+            is_own = stat.S_ISREG(status.st_mode) and status.st_uid == os.geteuid()
+            if is_own and COMPUTER.time() - status.st_mtime >= _LOCKED_WITHIN_S:
+                # Raises BlockingIOError while the process lives.
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                (folder / name).unlink(missing_ok=True)
+                lock.unlink()
+
+
 def free_bytes(folder: Path = SHARED_MEMORY) -> int:
     """Return how much shared memory is free; 0 if there is none."""
     return shutil.disk_usage(folder).free if folder.is_dir() else 0
+
+
+def _names(folder: Path) -> list[str]:
+    if not folder.is_dir():
+        return []
+    with os.scandir(folder) as entries:
+        return sorted(entry.name for entry in entries)
 
 
 def _status(path: Path) -> os.stat_result | None:

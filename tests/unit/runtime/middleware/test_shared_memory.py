@@ -1,7 +1,8 @@
-"""Incomplete shared memory of killed processes is removed."""
+"""Shared memory that killed processes left is removed."""
 
 from __future__ import annotations
 
+import fcntl
 import os
 import threading
 import time
@@ -9,7 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.middleware.shared_memory import remove_incomplete_ports
+from composer.runtime.middleware.shared_memory import (
+    remove_dead_segments,
+    remove_incomplete_ports,
+)
 from composer.runtime.process import StartRefused
 
 READY, INITIALIZING = b"\x02\0\0\0 the rest", b"\x01\0\0\0 the rest"
@@ -109,3 +113,23 @@ def test_a_symbolic_link_named_like_a_port_is_not_followed(tmp_path: Path) -> No
     remove_incomplete_ports(DOMAIN, tmp_path)
     assert link.is_symlink()
     assert target.exists()
+
+
+def test_segments_are_removed_if_nothing_locks_them(tmp_path: Path) -> None:
+    remove_dead_segments(tmp_path / "nowhere")
+    names = {kind: f"fastrtps_{kind:0<16}" for kind in ("dead", "a1e", "feed")}
+    for kind, name in names.items():
+        segment(tmp_path, name, READY)
+        segment(tmp_path, f"{name}_el", b"", old=kind != "feed")
+    lone = segment(tmp_path, "fastrtps_0123456789abcdef", READY)
+    link = tmp_path / "fastrtps_00000000000000ff"
+    link.with_name(f"{link.name}_el").symlink_to(lone)
+    segment(tmp_path, link.name, READY)
+    with (tmp_path / f"{names['a1e']}_el").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        remove_dead_segments(tmp_path)
+    remain = {path.name for path in tmp_path.iterdir()}
+    dead = {names["dead"], f"{names['dead']}_el"}
+    assert not dead & remain
+    assert {names["a1e"], names["feed"], lone.name, link.name} < remain
+    assert len(remain) == 7
