@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -16,6 +17,7 @@ from composer.runtime.callbacks.log import severity
 from composer.runtime.children.command_line import remappings
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.tasks import sleep
 from composer.runtime.node.parameters import parameter_message
 from composer.runtime.outside_nodes.external_node import PERIOD_S
 from composer.runtime.outside_nodes.outside_node import (
@@ -111,15 +113,21 @@ class ComponentNode(StartedNode["LoadedComponent"]):
         """Load the component once the container is there. Raises LoadFailed, NotAnswered."""
         if not await self._until_ready(run.is_ready, end_s):
             raise NotAnswered(f"{run.container.full_name} has no service {run.load_service}")
-        for unique_id in await run.ids(self.full_name, end_s):
-            self._listener.write_log(
-                LogLevel.WARN, self._logger, "it was loaded already, and is loaded again"
-            )
-            await run.unload(unique_id, end_s)
-        name = await run.load(_load_request(self.model, self._component), self.full_name, end_s)
-        if name != self.full_name:
+        async with run.alone(end_s):
+            for unique_id in await run.ids(self.full_name, end_s):
+                self._listener.write_log(
+                    LogLevel.WARN, self._logger, "it was loaded already, and is loaded again"
+                )
+                await run.unload(unique_id, end_s)
+            name = await run.load(_load_request(self.model, self._component), self.full_name, end_s)
+            if name != self.full_name:
+                await run.unload(run.unique_id, end_s)
+                raise LoadFailed(f"{run.container.full_name} has given it the name {name}")
+
+    async def _unload(self, run: LoadedComponent, end_s: float) -> None:
+        """Unload the component. Raises NotAnswered."""
+        async with run.alone(end_s):
             await run.unload(run.unique_id, end_s)
-            raise LoadFailed(f"{run.container.full_name} has given it the name {name}")
 
     async def _end(self) -> None:
         """Unload the component."""
@@ -130,10 +138,8 @@ class ComponentNode(StartedNode["LoadedComponent"]):
         self._started = None  # its end is expected
         try:
             if not run.ended.done() and run.container.state == ACTIVE:
-                limit_s = self._limit_s(self._timeout_s)
-                await self._while_it_runs(
-                    run, run.unload(run.unique_id, self.loop.clock.monotonic() + limit_s)
-                )
+                end_s = self.loop.clock.monotonic() + self._limit_s(self._timeout_s)
+                await self._while_it_runs(run, self._unload(run, end_s))
                 if self._end_s is None:  # it may be loaded again
                     end_s = self.loop.clock.monotonic() + _GONE_WITHIN_S
                     await self._until(lambda: not self._presence.has_node(self.earlier), end_s)
@@ -203,6 +209,21 @@ class LoadedComponent(RemoteServices):
         self.container.followers.discard(self._follow)
         super().close()
 
+    @asynccontextmanager
+    async def alone(self, end_s: float) -> AsyncIterator[None]:
+        """Wait until the container does nothing for another component. Raises NotAnswered."""
+        while (current := self.container.loading.try_acquire()) is not None:
+            left_s = end_s - self._clock.monotonic()
+            if left_s <= 0.0:
+                raise NotAnswered(f"{self.container.full_name} is busy with another component")
+            turn = sleep(self._loop, left_s)
+            current.add_done_callback(partial(_wake, turn))
+            await turn
+        try:
+            yield
+        finally:
+            self.container.loading.release()
+
     def is_ready(self) -> bool:
         """Return whether the container has its services."""
         return all(client.service_is_ready() for client in self._clients) and (
@@ -249,6 +270,10 @@ class LoadedComponent(RemoteServices):
         """Unload a node, which need not be loaded. Raises NotAnswered."""
         request = _service("UnloadNode").Request(unique_id=unique_id)
         await self._ask(self._unloading, request, end_s)
+
+
+def _wake(turn: Future[None], _: object) -> None:
+    turn.set_result(None)
 
 
 def _load_request(node: Node, component: Component) -> _Message:

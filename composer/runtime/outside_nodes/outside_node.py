@@ -28,6 +28,7 @@ from composer.runtime.node.managed_node import (
     ManagedLifecycle,
     ManagedNode,
     NodeListener,
+    TransitionLock,
     TransitionOutcome,
 )
 from composer.runtime.outside_nodes.remote_node import DONE_IN
@@ -83,6 +84,8 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         self._is_lost = False
         #: Called if it ends by itself, before that is reported.
         self.followers: set[Callable[[], None]] = set()
+        #: Held while a container loads or unloads: of requests that wait, DDS keeps ten.
+        self.loading = TransitionLock()
         #: The participants of its earlier processes, which DDS shows for a while.
         self.earlier: frozenset[bytes] = frozenset()
 

@@ -164,6 +164,21 @@ def test_slow_constructor_is_loaded_once(tmp_path: Path, peer: Peer) -> None:
         assert loaded(peer) == ["/robot/left/talker"]
 
 
+def test_a_container_may_be_slow_with_more_components_than_its_services_queue(
+    tmp_path: Path, peer: Peer
+) -> None:
+    """A service keeps ten requests, and drops the others without a word."""
+    names = [f"talker_{number:02}" for number in range(14)]
+    slow = TALKER.replace("demo::Talker", "demo::Slow\n      ready_timeout_ms: 60000")
+    nodes = [slow.replace("  talker:", f"  {name}:") for name in names]
+    with running(robot(*nodes), tmp_path) as system:
+        assert not system.reported(NodeFailed)
+        assert loaded(peer) == [f"/robot/left/{name}" for name in names]
+        assert system.stop().exit_code == 0
+    unloaded = {f"unloads /robot/left/{name}" for name in names}
+    wait_until(lambda: unloaded <= {*system.log()}, "the end of all before their container's")
+
+
 def test_external_container(tmp_path: Path, peer: Peer) -> None:
     """It is awaited; what an earlier run has left in it is unloaded; its end and return count."""
     with external_container() as process:
