@@ -308,12 +308,12 @@ class Node:
 
     @property
     def all_ports(self) -> tuple[Port, ...]:
-        """The ports, and those on /tf and /tf_static that follow from ``transforms``."""
+        """The ports, and the ports on /tf and /tf_static that follow from ``transforms``."""
         return self.ports if self.transforms is None else self.ports + self.transforms.ports
 
     @property
     def visible_ports(self) -> tuple[Port, ...]:
-        """The same, as ROS tools see them: the manager listens to /tf for our own nodes."""
+        """All ports as ROS tools see them: for behaviors, the manager listens to /tf."""
         if self.transforms is None or not self.implementation.declares_everything:
             return self.all_ports
         return self.ports + self.transforms.publishers

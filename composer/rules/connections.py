@@ -171,9 +171,10 @@ def _similar_names(context: Context, endpoint: PortOfNode) -> Iterator[str]:
 
 
 def is_meant_by_another(context: Context, publisher: PortOfNode) -> bool:
-    """Return whether a subscription without a publisher is probably meant to have this one.
+    """Return whether a subscription without a publisher probably means this publisher.
 
-    That is, its name is similar, and is written less often: it is the misspelled one of the two.
+    Their names are similar, and the name of the subscription is written less often, so that is the
+    misspelled one.
     """
     key = (publisher.port.interface.value, publisher.port.full_name)
     meant = context.once(_meant_publishers).get(key)

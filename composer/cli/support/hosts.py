@@ -49,7 +49,7 @@ def files_to_copy(system: System, root: Path) -> CopiedFiles:
 
 
 def write_staying(files: CopiedFiles) -> None:
-    """Write the files of the project that are not copied, but those that each computer makes."""
+    """List the files of the project that are not copied, with the reasons."""
     write(lines(f"not copied: {text}" for text in files.reasons))
 
 

@@ -38,8 +38,8 @@ _MEASURED_DEPTH, _MAX_MEASURED = 100, 200
 def large_profile(profile: QosProfile) -> QosProfile:
     """Return a profile to read large messages.
 
-    They are not requested reliably: a reader that is late would delay a publisher. Latched ones,
-    such as maps, only arrive if they are.
+    It is best effort, because a late reliable reader would delay the publisher. Latched messages,
+    such as maps, arrive at reliable readers only, so for these it stays reliable.
     """
     few = replace(profile, depth=min(profile.depth, _LARGE_DEPTH))
     if profile.durability is Durability.VOLATILE:

@@ -182,7 +182,7 @@ class SourceGroup:
         self.signal.write(1 if self._may_skip else _ALL)
 
     def finish_round(self, taken: int) -> None:
-        """Update ``due`` after a take from each source, ``taken`` of which returned an item."""
+        """Update ``due`` after a round of takes; ``taken`` is how many of them returned an item."""
         if taken < self.due and (taken or self._may_skip):
             self.due -= taken or 1
         else:

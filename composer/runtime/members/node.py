@@ -71,7 +71,7 @@ class MemberNode(OutsideNode):
 
     @property
     def figures(self) -> Mapping[str, Any]:
-        """What its process reports of it, by the names of the fields of ``NodeReport``."""
+        """What the process reports of the node, by the names of the fields of ``NodeReport``."""
         return self._process.figures(self.full_name).current
 
     @property

@@ -108,8 +108,8 @@ def use_command_profile(environment: MutableMapping[str, str]) -> None:
 def use_large_system_profile(environment: MutableMapping[str, str]) -> None:
     """Select the profile for a process that ends with a fast exit.
 
-    With the default profile, the thread that announces the end of a participant would be stopped
-    before it has; other processes would wait for the participant for 20 s.
+    With the default profile, a thread announces the end of a participant. A fast exit would stop
+    the thread first, and other processes would show the participant for 20 s.
     """
     if environment.get(PROFILES_VARIABLE) == str(_PROFILE):
         environment[PROFILES_VARIABLE] = str(_PROFILE_FOR_LARGE_SYSTEMS)

@@ -180,12 +180,12 @@ def socket_path(name: str) -> Path | None:
 
 
 def goals_path(name: str) -> Path | None:
-    """Return the path of the file with the goals of a system; None as for a socket."""
+    """Return the path of the file with the goals of a system; see :func:`socket_path`."""
     return private_path(_file_name(name, ".goals"))
 
 
 def private_path(file_name: str) -> Path | None:
-    """Return the path of a file in the folder of the lock files; None as for a socket."""
+    """Return the path of a file in the folder of the lock files; see :func:`socket_path`."""
     try:
         with _open_folder():
             return _folder() / file_name
