@@ -157,14 +157,23 @@ class BagWriter:
         with self._errors():
             stream = path.open("xb")
             writer = Writer(stream)
-            writer.start(profile="ros2", library="ros2-composer")
-            for item in self._attachments:
-                now_ns = time.time_ns()
-                writer.add_attachment(now_ns, now_ns, *item)
-            writer.flush()
+            try:
+                self._start(writer)
+            except OSError:
+                with suppress(OSError):  # of what is still to be written
+                    stream.close()
+                path.unlink(missing_ok=True)
+                raise
         file = _File(path, stream, writer, {})
         self._files.append(file)
         return file
+
+    def _start(self, writer: Writer) -> None:
+        writer.start(profile="ros2", library="ros2-composer")
+        for item in self._attachments:
+            now_ns = time.time_ns()
+            writer.add_attachment(now_ns, now_ns, *item)
+        writer.flush()
 
     def _add_channel(self, file: _File, topic: BagTopic) -> int:
         schema = file.writer.register_schema(
@@ -236,6 +245,7 @@ class BagWriter:
         try:
             yield
         except OSError as error:
-            with suppress(OSError):
-                self._files[-1].stream.close()
+            for file in self._files[-1:]:
+                with suppress(OSError):
+                    file.stream.close()
             raise BagError(f"cannot write {self.folder}: {error.strerror}") from error

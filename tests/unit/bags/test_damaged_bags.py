@@ -157,11 +157,14 @@ from tests.unit.bags.test_form import write
 from pathlib import Path
 import signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+size = int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 write(Path(sys.argv[1]), 20_000, padding=bytes(range(256)) * 4)
 """
-    command = [sys.executable, "-c", limit, str(tmp_path / "full")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert "BagError: cannot write" in done.stderr
-    assert "File too large" in done.stderr
-    assert len(read(open_bag(tmp_path / "full"))) > 1000
+    for size in (10, 100_000):  # the disk is full from the beginning, or later
+        command = [sys.executable, "-c", limit, str(tmp_path / f"full{size}"), str(size)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert "BagError: cannot write" in done.stderr
+        assert "File too large" in done.stderr
+    assert not (tmp_path / "full10").exists()
+    assert len(read(open_bag(tmp_path / "full100000"))) > 1000
