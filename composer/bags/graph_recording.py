@@ -21,6 +21,8 @@ from composer.runtime.ros_graph.endpoints import TopicInfo
 
 #: Latched messages of a topic, and what arrives while this program is busy.
 _DEPTH = 1000
+#: Topics that are recorded or refused. Any program of the domain can create more.
+_MAX_TOPICS = 1000
 
 
 class GraphRecording:
@@ -41,6 +43,7 @@ class GraphRecording:
         self._interfaces = Interfaces.installed()
         self._subscriptions: dict[str, tuple[Subscription, QosProfile]] = {}
         self._refused: set[str] = set()
+        self._is_limited = False
 
     @property
     def topics(self) -> int:
@@ -51,6 +54,10 @@ class GraphRecording:
         """Subscribe to new topics, and again where a publisher does not match."""
         for name, types in self._session.graph.topics():
             if is_hidden(owner_of_topic(name)[1]) or name in self._refused:
+                continue
+            is_new = name not in self._subscriptions
+            if is_new and len(self._subscriptions) + len(self._refused) >= _MAX_TOPICS:
+                self._warn_of_limit()
                 continue
             info = self._session.graph.topic(name, types)
             if info.publishers and self._is_wanted(info):
@@ -87,6 +94,11 @@ class GraphRecording:
             message_class, info.name, partial(put), rclpy_profile(profile), raw=True
         )
         self._subscriptions[info.name] = (subscription, profile)
+
+    def _warn_of_limit(self) -> None:
+        if not self._is_limited:
+            self._is_limited = True
+            self._warn(f"there are more than {_MAX_TOPICS:,} topics: no further ones are recorded")
 
     def _refuse(self, name: str, reason: str) -> None:
         self._refused.add(name)

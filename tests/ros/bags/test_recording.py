@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import signal
 import threading
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.service_introspection import ServiceIntrospectionState
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from composer.bags.bag import Bag, BagError, BagMessage, BagTopic
 from composer.bags.comparing import decoded
 from composer.bags.reader import open_bag
 from composer.bags.recorder import Recorder
 from composer.runtime.clock.clock import COMPUTER
-from tests.ros.support.commands import compose, error, finished, output_of, running, start
+from tests.ros.support.commands import compose, error, finished, output_of, running
 from tests.ros.support.forked import ForkedCommand
-from tests.ros.support.in_process import PATIENCE_S, Peer, wait_until
+from tests.ros.support.in_process import PATIENCE_S, wait_until
 
 COUNTING = """\
 system: counting
@@ -75,7 +70,7 @@ def _system(bags: Path, more: str = "") -> Path:
     return path
 
 
-def _decoded(folder: Path, topic: str) -> list[object]:
+def decoded_data(folder: Path, topic: str) -> list[object]:
     """Return the values on a topic, as another library reads them, without our definitions."""
     with AnyReader([folder]) as reader:
         connections = [item for item in reader.connections if item.topic == topic]
@@ -89,8 +84,8 @@ def test_a_system_records_itself(bags: Path) -> None:
     path = _system(bags, "split_s: 2")
     output_of("run", path, "--time", "virtual", "--for", "5")
     [folder] = bags.iterdir()
-    assert _decoded(folder, "/numbers") == list(range(1, 501))
-    assert _decoded(folder, "/map") == ["the map"]
+    assert decoded_data(folder, "/numbers") == list(range(1, 501))
+    assert decoded_data(folder, "/map") == ["the map"]
     bag = open_bag(folder)
     assert set(bag.summary.topics) == {"/numbers", "/map"}
     assert len(bag.files) == 3
@@ -103,11 +98,11 @@ def test_a_system_records_itself(bags: Path) -> None:
 
     part, whole = bags / "part", bags / "whole"
     output_of("bag", "slice", folder, "-o", part, "--start", "1", "--duration", "1")
-    assert _decoded(part, "/numbers") == list(range(100, 200))
+    assert decoded_data(part, "/numbers") == list(range(100, 200))
     rest = bags / "rest"
     output_of("bag", "slice", folder, "-o", rest, "--start", "2", "--topics", "/n*")
     output_of("bag", "merge", rest, part, "-o", whole)
-    assert _decoded(whole, "/numbers") == list(range(100, 501))
+    assert decoded_data(whole, "/numbers") == list(range(100, 501))
     assert "the bags are equal" in output_of("bag", "diff", folder, folder)
     done = compose("bag", "diff", rest, whole)
     assert (done.returncode, done.stdout) == (
@@ -178,7 +173,7 @@ def _recorded(bag: Bag, topic: str) -> list[Any]:
     return messages
 
 
-def _calls(bag: Bag, name: str) -> list[tuple[int, int, Any]]:
+def calls_of_service(bag: Bag, name: str) -> list[tuple[int, int, Any]]:
     """Return the kinds, numbers and contents of the events of a service."""
     events = _recorded(bag, f"{name}/_service_event")
     return [
@@ -193,12 +188,12 @@ def test_everything_but_messages_is_recorded_in_virtual_time(tmp_path: Path) -> 
     finished(ForkedCommand(*words, cwd=tmp_path))
     [folder] = (tmp_path / "bags").iterdir()
     bag = open_bag(folder)
-    goals = _calls(bag, "/navigate/_action/send_goal")
+    goals = calls_of_service(bag, "/navigate/_action/send_goal")
     assert [kind for kind, *_ in goals] == [1, 2, 1, 2, 1, 2]
     assert sorted(content.accepted for _, _, content in goals[1::2]) == [False, True, True]
-    results = _calls(bag, "/navigate/_action/get_result")
+    results = calls_of_service(bag, "/navigate/_action/get_result")
     assert sorted(item.status for kind, _, item in results if kind == 2) == [4, 5]
-    [_, (_, _, canceled)] = _calls(bag, "/navigate/_action/cancel_goal")
+    [_, (_, _, canceled)] = calls_of_service(bag, "/navigate/_action/cancel_goal")
     assert len(canceled.goals_canceling) == 1
     feedback = _recorded(bag, "/navigate/_action/feedback")
     accepted = {bytes(item.goal_id.uuid) for kind, _, item in results if kind == 1}
@@ -229,11 +224,11 @@ def test_calls_of_a_class_are_recorded(tmp_path: Path) -> None:
     [folder] = (tmp_path / "bags").iterdir()
     bag = open_bag(folder)
     assert "/rosout" not in bag.summary.topics
-    calls = _calls(bag, "/enable")
+    calls = calls_of_service(bag, "/enable")
     assert sorted((kind, number) for kind, number, _ in calls) == [(0, 1), (1, 1), (2, 1), (3, 1)]
     assert [item.message for kind, _, item in calls if kind in (2, 3)] == ["enabled"] * 2
-    [_, (_, _, response)] = _calls(bag, "/go/_action/send_goal")
-    [_, (_, _, result)] = _calls(bag, "/go/_action/get_result")
+    [_, (_, _, response)] = calls_of_service(bag, "/go/_action/send_goal")
+    [_, (_, _, result)] = calls_of_service(bag, "/go/_action/get_result")
     assert (response.accepted, result.status) == (True, 4)
     assert len(_recorded(bag, "/go/_action/feedback")) == 1
     changed = [item.changed_parameters for item in _recorded(bag, "/parameter_events")]
@@ -245,15 +240,15 @@ def test_a_flight_recorder_writes_at_a_fault_and_on_request(bags: Path) -> None:
     with running(bags.parent / "log", str(path)) as run:
         run.wait_for("1 of 1 nodes active")
         folder = Path(output_of("record", "counting", "--now").strip())
-        numbers = _decoded(folder, "/numbers")
+        numbers = decoded_data(folder, "/numbers")
         assert numbers == list(range(numbers[0], numbers[-1] + 1))
         output_of("service", "call", "/fail", "std_srvs/srv/Trigger", "{}")
         run.wait_for("recorded the last seconds: ")
         [other] = [item for item in bags.iterdir() if item.name != folder.name]
-        after = _decoded(other, "/numbers")
+        after = decoded_data(other, "/numbers")
         assert after[0] > numbers[-1]  # each message is written once
         assert 0 < len(after) <= 200
-        assert _decoded(other, "/map") == ["the map"]  # it was latched before
+        assert decoded_data(other, "/map") == ["the map"]  # it was latched before
         attached = {item.name: item.data.decode() for item in open_bag(other).attachments()}
         assert "counter failed: requested" in attached["recording.json"]
         run.stop()
@@ -270,53 +265,6 @@ def test_what_cannot_be_recorded_is_named(bags: Path) -> None:
         assert "already runs" in error("run", bags.parent / "counting.yaml")
         assert len(list(bags.iterdir())) == 1  # a run that does not start leaves no bag
         run.stop()
-
-
-@pytest.fixture
-def publishing(peer: Peer) -> Node:
-    """Two publishers of one topic, one of them best effort, a latched topic, and a service."""
-    node = peer.node
-    latched = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    map_publisher = node.create_publisher(String, "/map", latched)
-    for number in range(3):
-        map_publisher.publish(String(data=f"map {number}"))
-    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-    for name, profile in (("a", QoSProfile(depth=1)), ("b", weak)):
-        publisher = node.create_publisher(String, "/chatter", profile)
-        node.create_timer(0.02, lambda name=name, to=publisher: to.publish(String(data=name)))
-    service = node.create_service(Trigger, "/introspected", lambda _, response: response)
-    contents = ServiceIntrospectionState.CONTENTS
-    service.configure_introspection(node.get_clock(), QoSProfile(depth=10), contents)
-    client = node.create_client(Trigger, "/introspected")
-    node.create_timer(0.05, lambda: client.call_async(Trigger.Request()))
-    return node
-
-
-@pytest.mark.usefixtures("publishing")
-def test_the_graph_is_recorded(tmp_path: Path) -> None:
-    folder = tmp_path / "bag"
-    patterns = ("--topics", "/map", "--topics", "/chat*", "--services", "/intro*")
-    process = start("record", "-o", str(folder), *patterns)
-    while True:  # what was written can be read at any time
-        try:
-            found = set(open_bag(folder).summary.counts)
-        except BagError:
-            found = set()
-        if found == {"/map", "/chatter", "/introspected/_service_event"} and process.poll() is None:
-            break
-        assert process.poll() is None
-    process.send_signal(signal.SIGTERM)
-    output, text = process.communicate(timeout=60.0)
-    assert process.returncode == 0, text
-    assert f" 0 dropped: {folder}\n" in output
-    assert _decoded(folder, "/map") == ["map 0", "map 1", "map 2"]
-    assert set(_decoded(folder, "/chatter")) == {"a", "b"}
-    bag = open_bag(folder)
-    assert {kind for kind, *_ in _calls(bag, "/introspected")} == {1, 2}
-    topics = bag.summary.topics
-    assert [item.durability for item in topics["/map"].qos] == ["transient_local"]
-    assert {item.reliability for item in topics["/chatter"].qos} == {"reliable", "best_effort"}
-    assert topics["/map"].type_hash.startswith("RIHS01_")
 
 
 class _FullDisk:
