@@ -101,13 +101,14 @@ def live(
             f"no node{matching}", hint="'compose node list' lists the nodes of the ROS graph"
         )
     from composer.bridges.importing.writing import readable, write_system
-    from composer.language.document.limits import MAX_BYTES
 
     found = readable(found)
     text = write_system(found)
-    if len(text.encode()) > MAX_BYTES:
+    problem = why_too_large(text)
+    if problem is not None:
         raise CommandError(
-            f"the file would have more than {MAX_BYTES:,} bytes", hint="choose nodes with --node"
+            f"'compose validate' would refuse the file: {problem}",
+            hint="choose nodes with --node",
         )
     write_output(text, output)
     _report_left_out(found.left_out)
@@ -228,6 +229,16 @@ def import_launch(
         texts = {output.name: write_system(found, name), name: write_parameters(found)}
         write_and_say(output.parent, texts)
     _report_left_out(found.left_out)
+
+
+def why_too_large(text: str) -> str | None:
+    """Return which limit of the language the text of a system exceeds, or None."""
+    from composer.language.rules import TOO_LARGE
+    from composer.loading import load_bytes
+
+    diagnostics = load_bytes(text.encode(), Path.cwd(), shown="text").diagnostics
+    messages = (item.message for item in diagnostics if item.rule.code == TOO_LARGE.code)
+    return next(messages, None)
 
 
 def _known_types() -> set[str]:

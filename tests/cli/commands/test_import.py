@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.cli.commands.import_nodes import why_too_large
 from tests.cli.compose import compose
 
 
@@ -33,3 +34,19 @@ def test_a_module_that_the_new_file_does_not_find_is_noted(
     assert note in compose("import", "class", "driver:Driver", "-o", "other/driver.yaml").err
     done = compose("import", "class", "driver:Driver", "-o", "driver.yaml")
     assert done.err == "wrote driver.yaml\n"
+
+
+@pytest.mark.parametrize(
+    ("count", "value", "problem"),
+    [
+        (5_000, "1.0", None),
+        (5_001, "1.0", "'parameters' has more than 5,000 entries"),
+        (300, "x" * 9_000, "this file is larger than 2,000,000 bytes"),
+    ],
+)
+def test_what_validate_would_refuse_is_not_written(
+    count: int, value: str, problem: str | None
+) -> None:
+    parameters = "".join(f"      p{number}: {value}\n" for number in range(count))
+    text = f"system: s\nnodes:\n  a:\n    external: true\n    parameters:\n{parameters}"
+    assert why_too_large(text) == problem
