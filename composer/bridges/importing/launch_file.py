@@ -355,9 +355,8 @@ def _declared(
 
 def _sections_of_all(report: Mapping[str, Any], lost: list[str]) -> dict[str, dict[str, Plain]]:
     """Return the parameters of nodes inside programs; where arguments change them, the defaults."""
-    base = _sections(report["base"], lost)
-    items = [item for visit in report["visits"] for item in visit["nodes"]]
-    found = _sections(items, [])
+    base = _sections([report["base"]], lost)
+    found = _sections([visit["nodes"] for visit in report["visits"]], [])
     for name, values in base.items():
         if changed := sorted(key for key in values if key not in found.get(name, {})):
             lost.append(f"parameters of {name} with other arguments: {', '.join(changed)}")
@@ -365,15 +364,20 @@ def _sections_of_all(report: Mapping[str, Any], lost: list[str]) -> dict[str, di
 
 
 def _sections(
-    items: Iterable[Mapping[str, Any]], left_out: list[str]
+    visits: Iterable[Sequence[Mapping[str, Any]]], left_out: list[str]
 ) -> dict[str, dict[str, Plain]]:
-    """Return the parameters of the nodes that the launch file does not name, by full names.
+    """Return the parameters of the nodes that a visit does not name, by full names.
 
-    Programs may create them. A system has one set of parameters for each name, so what only some
-    programs give to that name is left out.
+    Programs may create them. Another visit may name them: with other arguments, a program may be a
+    component. A system has one set of parameters for each name, so what only some programs give to
+    that name is left out.
     """
+    given: dict[str, list[Mapping[str, Any]]] = {}
+    for nodes in visits:
+        for name, sections in inner_sections(nodes).items():
+            given.setdefault(name, []).extend(sections)
     found: dict[str, dict[str, Plain]] = {}
-    for name, (first, *others) in inner_sections(items).items():
+    for name, (first, *others) in given.items():
         shared = {
             key: value
             for key, value in first.items()

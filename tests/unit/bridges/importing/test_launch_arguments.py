@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from composer.base.diagnostics import Severity
+from composer.bridges.importing.found import FoundSystem
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
 from composer.launch.variants import all_visits, mark
@@ -31,10 +32,8 @@ def argument(name: str, default: str | None, *choices: str) -> dict[str, Any]:
     return {"name": name, **value, "description": "", "choices": list(choices)}
 
 
-def visited(
-    nodes: Nodes, *arguments: dict[str, Any], **compared: list[str]
-) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the system and what is left out of a launch file that has ``nodes(values)``."""
+def described(nodes: Nodes, *arguments: dict[str, Any], **compared: list[str]) -> FoundSystem:
+    """Return the description of a launch file that has ``nodes(values)``."""
     defaults = {item["name"]: item["value"] for item in arguments}
 
     def visit(values: Mapping[str, str]) -> dict[str, Any]:
@@ -48,7 +47,14 @@ def visited(
             "compared": compared,
         }
 
-    found = describe_launch_file("s", "f.launch.py", (), all_visits(visit, {}))
+    return describe_launch_file("s", "f.launch.py", (), all_visits(visit, {}))
+
+
+def visited(
+    nodes: Nodes, *arguments: dict[str, Any], **compared: list[str]
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the system and what is left out of a launch file that has ``nodes(values)``."""
+    found = described(nodes, *arguments, **compared)
     return yaml.safe_load(write_system(found)), found.left_out
 
 
@@ -345,6 +351,22 @@ def test_a_container_that_something_else_starts_has_the_condition_of_its_compone
 
     system, _ = visited(nodes, argument("composed", "False"))
     assert conditions(system["nodes"]["box"]) == {"if": "composed"}
+
+
+@pytest.mark.parametrize("composed", ["True", "False"])
+def test_a_program_has_the_parameters_of_a_name_that_other_arguments_give(composed: str) -> None:
+    """nav2's controller is a component with a name, or a program that names itself."""
+
+    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+        component = {"package": "p", "plugin": "p::P"}
+        if values["composed"] == "True":
+            container = ("/", "box")
+            return [node("a", component=component, container=container, parameters={"rate": 2})]
+        return [node(None, executable="a", sections={"/a": {"rate": 2}})]
+
+    found = described(nodes, argument("composed", composed))
+    assert found.sections == {"/a": {"rate": 2}}
+    assert not found.left_out
 
 
 LAUNCH = """\
