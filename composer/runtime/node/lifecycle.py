@@ -172,14 +172,16 @@ class Lifecycle(ManagedLifecycle):
         cause = await self._attempt(
             transition, partial(self._hooks.on_transition, transition, start)
         )
-        if cause is not None and issubclass(type(cause), TransitionFailed):
+        reason = ""
+        if cause is None:
+            self._trigger(_SUCCESS)
+        elif issubclass(type(cause), TransitionFailed):
+            reason = text_of(cause)
             self._trigger(_FAILURE)
-        elif cause is not None:
+        else:
+            reason = describe(cause)
             self._trigger(_ERROR)
             await self._process_error(cause)
-        else:
-            self._trigger(_SUCCESS)
-        reason = "" if cause is None else describe(cause)
         result = TransitionOutcome(
             transition, self.state, success=cause is None, reason=reason, requested=requested
         )
