@@ -155,13 +155,12 @@ class NearbyModules:
     """The modules next to one that does not exist.
 
     ``package`` is the longest part of its name that is a package, ``missing`` the part that
-    follows. ``names`` are the modules next to that part. ``may_be_compiled``: there may be more.
+    follows. ``names`` are the modules next to that part.
     """
 
     package: str
     missing: str
     names: Sequence[str]
-    may_be_compiled: bool
 
     @property
     def path(self) -> str:
@@ -180,7 +179,7 @@ class NearbyModules:
         Python's own modules have no classes of nodes.
         """
         installed = () if self.package else _modules_in(map(Path, sys.path))
-        names = [name for name, _ in installed if name not in sys.stdlib_module_names]
+        names = [name for name in installed if name not in sys.stdlib_module_names]
         close = self.similar or nearest(self.missing, names)
         return f"did you mean '{close}'?" if close is not None else None
 
@@ -193,25 +192,18 @@ def nearby_modules(module: str, folders: Iterable[Path]) -> NearbyModules:
         inner = [*_package_folders(parts[:count], bases)]
         if inner:
             places, package = inner, count
-    modules = [*_modules_in(places)]
-    return NearbyModules(
-        package=".".join(parts[:package]),
-        missing=parts[package],
-        names=[name for name, _ in modules],
-        may_be_compiled=bool(package) and any(suffix in _COMPILED for _, suffix in modules),
-    )
+    return NearbyModules(".".join(parts[:package]), parts[package], [*_modules_in(places)])
 
 
-def _modules_in(folders: Iterable[Path]) -> Iterator[tuple[str, str]]:
-    """Yield the names of the files and folders that may be modules, with their suffixes."""
+def _modules_in(folders: Iterable[Path]) -> Iterator[str]:
+    """Yield the names of the files and folders that may be modules."""
     for folder in folders:
         with suppress(OSError, ValueError):
             for entry in os.listdir(folder):  # noqa: PTH208 - it takes a tenth of Path.iterdir
                 name, _, rest = entry.partition(".")
-                suffix = f".{rest.rpartition('.')[2]}" if rest else ""
-                is_module = suffix in (".py", ".pyi", *_COMPILED) or not rest
+                is_module = entry.endswith((".py", ".pyi", *_COMPILED)) or not rest
                 if is_module and name.isidentifier():
-                    yield name, suffix
+                    yield name
 
 
 def _package_folders(parts: list[str], bases: Iterable[Path]) -> Iterator[Path]:

@@ -24,7 +24,6 @@ class Family(Enum):
     TYPE = "type-error"
     RETURN = "missing-return"
     NONE = "unchecked-none"
-    UNUSED = "unused-result"
     ASYNCIO = "asyncio-call"
     EARLY = "too-early"
     FRAME = "frame-id-slash"

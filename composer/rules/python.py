@@ -45,7 +45,6 @@ UNDEFINED_NAME = warning("RC447", "undefined-name")
 CALL_ARGUMENTS = warning("RC452", "call-arguments")
 TYPE_ERROR = warning("RC455", "type-error")
 MISSING_SELF = error("RC449", "missing-self")
-UNUSED_RESULT = warning("RC453", "unused-result")
 NOT_CHECKED = info("RC437", "not-checked")
 PYTHON_SYNTAX = error("RC441", "python-syntax")
 UNKNOWN_ATTRIBUTE = error("RC442", "unknown-attribute")
@@ -74,7 +73,6 @@ _RELIES_ON: Mapping[Family, tuple[str, ...]] = {
     Family.FIELD: ("type",),
     Family.VALUE: ("parameter", "type"),
     Family.MESSAGE_TYPE: ("type",),
-    Family.INDEX: ("parameter",),
     Family.IMPORT: ("folder",),
     Family.NOT_INSTALLED: ("folder",),
 }

@@ -61,6 +61,7 @@ class Check:
         owners = Owners(self._files.behaviors, self._interfaces)
         found = list(self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS}))
         seen: set[tuple[str, str]] = set()
+        wrong_imports: set[str] = set()
         for finding, span, code, relevance in self._relevant(findings, owners):
             source = self._files.files[finding.path].source
             reader = Reader(finding, source, code, relevance, owners, span)
@@ -69,9 +70,13 @@ class Check:
             if problem is not None:
                 if finding.kind != "missing-import":  # all places of one are shown together
                     keys.add((finding.path, problem.message))
+                if problem.family is Family.IMPORT:  # the name that was meant may be used
+                    wrong_imports.add(finding.path)
+                if problem.family is Family.NAME and finding.path in wrong_imports:
+                    continue
                 if seen.isdisjoint(keys):
                     found.append((finding.path, problem))
-            seen |= keys | {(finding.path, about) for about in reader.follow_ups}
+            seen |= keys
         return found + [
             (path, Problem(Family.NOT_CHECKED, _TOO_MANY, span)) for path, span in self._unread
         ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import TypeVar
@@ -12,14 +11,17 @@ from composer.base.source import Span
 from composer.python_code.syntax import Module
 from composer.python_code.trees import (
     Function,
+    called_name,
     catches,
     dotted,
+    last_name,
     positional_arguments,
     span_of,
     walk,
 )
 
 _Statement = TypeVar("_Statement", bound=ast.stmt)
+_Assignment = ast.Assign | ast.AnnAssign | ast.AugAssign
 #: What code raises that uses a value of a wrong type.
 _ERRORS = frozenset({"AttributeError", "NameError", "TypeError"})
 
@@ -31,24 +33,12 @@ class CodeIndex:
         self.module = module
         self._nodes = tuple(ast.walk(module.tree))
         self._expressions = [node for node in self._nodes if isinstance(node, ast.expr)]
-        self._places: dict[int, dict[Span, ast.expr]] = {}  # by line
-        self._balances: dict[ast.AST, Counter[str]] = {}  # by class or function
         self._calls = [node for node in self._expressions if isinstance(node, ast.Call)]
+        self._assignments = [node for node in self._nodes if isinstance(node, _Assignment)]
+        self._places: dict[int, dict[Span, ast.expr]] = {}  # by line
+        self._checked: dict[ast.AST, frozenset[str]] = {}  # by class or function
         self.classes = [node for node in self._nodes if isinstance(node, ast.ClassDef)]
         self.functions = [node for node in self._nodes if isinstance(node, Function)]
-
-    @cached_property
-    def assignments(self) -> list[tuple[ast.expr, ast.stmt, ast.expr | None]]:
-        """The targets of assignments, with the statement and the value."""
-        found: list[tuple[ast.expr, ast.stmt, ast.expr | None]] = []
-        for node in self._nodes:
-            match node:
-                case ast.Assign(targets=targets, value=value):
-                    for target in targets:
-                        found += [(x, node, value) for x in getattr(target, "elts", (target,))]
-                case ast.AnnAssign(target=target) | ast.AugAssign(target=target):
-                    found.append((target, node, node.value))
-        return found
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -57,42 +47,11 @@ class CodeIndex:
         return frozenset(names | {x.arg for item in self.functions for x in arguments_of(item)})
 
     @cached_property
-    def class_names(self) -> frozenset[str]:
-        """The names in the code that look like classes."""
-        return frozenset(name for name in self.names if name[:1].isupper())
-
-    @cached_property
-    def names_by_initial(self) -> Mapping[str, tuple[str, ...]]:
-        """What names may mean, by the first letter in lower case."""
-        found: dict[str, list[str]] = {}
-        for name in sorted({*self.names, *self.module.imports, *self.module.classes}):
-            found.setdefault(name[:1].lower(), []).append(name)
-        return {initial: tuple(names) for initial, names in found.items()}
-
-    @cached_property
-    def alternatives(self) -> frozenset[str]:
-        """Names that several imports or classes bind: a condition may select one of them."""
-        counts = Counter(node.name for node in self.classes)
-        several = (name for name, count in counts.items() if count > 1)
-        return frozenset({*self.module.alternatives, *several})
-
-    @cached_property
-    def passed_on(self) -> frozenset[str]:
-        """Names that calls pass."""
-        positional = (value for call in self._calls for value in call.args)
-        by_name = (keyword.value for call in self._calls for keyword in call.keywords)
-        return frozenset(map(dotted, (*positional, *by_name)))
-
-    @cached_property
-    def tested(self) -> frozenset[str]:
-        """The names whose attributes ``hasattr`` asks for."""
-        tests = (call for call in self._calls if dotted(call.func) == "hasattr" and call.args)
-        return frozenset(dotted(call.args[0]) for call in tests)
-
-    @cached_property
     def annotated_arguments(self) -> frozenset[str]:
         """Arguments with an annotation, of functions that no call passes on to rclpy."""
-        functions = (x for x in self.functions if f"self.{x.name}" not in self.passed_on)
+        passed = {dotted(value) for call in self._calls for value in call.args}
+        passed |= {dotted(item.value) for call in self._calls for item in call.keywords}
+        functions = (item for item in self.functions if f"self.{item.name}" not in passed)
         arguments = (argument for function in functions for argument in arguments_of(function))
         return frozenset(item.arg for item in arguments if item.annotation is not None)
 
@@ -129,41 +88,31 @@ class CodeIndex:
 
     @cached_property
     def _loose_lines(self) -> frozenset[int]:
-        several: dict[tuple[str, ast.stmt | None], bool] = {}
+        alternatives = self.module.alternatives.keys()
+        made = {key: {*map(_made_class, values)} - {""} for key, values in self._values.items()}
+        loose = {key for key, names in made.items() if len(names) > 1 or names & alternatives}
         lines = set()
         for node in self._expressions:
             name = dotted(node)
-            if not name or node.lineno in lines:
-                continue
-            key = (name, self._scope(name, node.lineno))
-            if key not in several:
-                several[key] = self._has_several_classes(self.values_of(name, node.lineno))
-            if several[key] or name.partition(".")[0] in self.alternatives:
+            is_loose = (name, self._scope(name, node.lineno)) in loose
+            if is_loose or name.partition(".")[0] in alternatives:
                 lines.add(node.lineno)
         return frozenset(lines)
 
-    def _has_several_classes(self, values: Iterable[ast.expr]) -> bool:
-        classes: set[str] = set()
-        for value in values:
-            made = dotted(value.func) if isinstance(value, ast.Call) else ""
-            last = made.rpartition(".")[2]
-            if made in self.alternatives:
-                return True
-            if isinstance(value, ast.Call) and last.startswith("create_"):
-                classes.add(ast.unparse(value.args[0]) if value.args else last)
-            elif last[:1].isupper():
-                classes.add(made)
-        return len(classes) > 1
-
     def is_guarded(self, line: int) -> bool:
-        """Return whether a line is in a ``try`` that catches what a wrong type raises."""
+        """Return whether a line is where code asks for attributes, or catches what a lack raises.
+
+        Which attributes an object has may depend on the version of a package.
+        """
         return line in self._guarded
 
     @cached_property
     def _guarded(self) -> Mapping[int, list[ast.stmt]]:
         tries = (node for node in self._nodes if isinstance(node, ast.Try))
         guards = (x for x in tries if any(catches(handler, _ERRORS) for handler in x.handlers))
-        return _by_line(statement for guard in guards for statement in guard.body)
+        asking = (self.function_at(x.lineno) for x in self._calls if called_name(x) == "hasattr")
+        guarded = [statement for guard in guards for statement in guard.body]
+        return _by_line([*guarded, *filter(None, asking)])
 
     def function_at(self, line: int) -> Function | None:
         """Return the innermost function that contains a line."""
@@ -181,21 +130,13 @@ class CodeIndex:
     def _classes(self) -> Mapping[int, list[ast.ClassDef]]:
         return _by_line(sorted(self.classes, key=lambda node: node.lineno))
 
-    def assigned_at(self, line: int) -> list[tuple[ast.expr, ast.stmt]]:
-        """Return the targets that a line assigns, with the statements."""
-        statements = dict.fromkeys(self._assigning.get(line, ()))
-        return [(target, node) for node in statements for target in self._targets[node]]
+    def assignment_at(self, line: int) -> _Assignment | None:
+        """Return the assignment in a line."""
+        return next(iter(self._assigning.get(line, ())), None)
 
     @cached_property
-    def _assigning(self) -> Mapping[int, list[ast.stmt]]:
-        return _by_line(self._targets)
-
-    @cached_property
-    def _targets(self) -> Mapping[ast.stmt, list[ast.expr]]:
-        found: dict[ast.stmt, list[ast.expr]] = {}
-        for target, node, _ in self.assignments:
-            found.setdefault(node, []).append(target)
-        return found
+    def _assigning(self) -> Mapping[int, list[_Assignment]]:
+        return _by_line(self._assignments)
 
     def values_of(self, name: str, line: int) -> list[ast.expr]:
         """Return the values of a local name or own attribute that a line may see."""
@@ -207,34 +148,31 @@ class CodeIndex:
     @cached_property
     def _values(self) -> Mapping[tuple[str, ast.stmt | None], list[ast.expr]]:
         found: dict[tuple[str, ast.stmt | None], list[ast.expr]] = {}
-        for target, node, value in self.assignments:
-            name = dotted(target)
-            around = self._classes if "." in name else self._functions
-            for scope in (None, *around.get(node.lineno, ())):
-                if value is not None:
-                    found.setdefault((name, scope), []).append(value)
+        for node in self._assignments:
+            for name in map(dotted, targets_of(node)):
+                around = self._classes if "." in name else self._functions
+                for scope in (None, *around.get(node.lineno, ())):
+                    if node.value is not None:
+                        found.setdefault((name, scope), []).append(node.value)
         return found
 
     def is_checked(self, scope: ast.AST, name: str) -> bool:
-        """Return whether a class or function reads a value other than by its members.
-
-        It then compares the value, tests it or stores it elsewhere.
-        """
-        if scope not in self._balances:
-            self._balances[scope] = _loads_without_uses(scope)
-        return self._balances[scope][name] > 0
+        """Return whether a class or function compares a value, tests it or stores it elsewhere."""
+        if scope not in self._checked:
+            self._checked[scope] = frozenset(map(dotted, _checks_in(scope)))
+        return name in self._checked[scope]
 
     def attributes_set(self) -> Iterator[str]:
         """Yield the methods and attributes that the code defines, of any object."""
-        for target, node, _ in self.assignments:
+        for node in self._assignments:
             if not isinstance(node, ast.AugAssign):  # which reads the attribute first
-                items = ast.walk(target)
+                items = (item for target in targets_of(node) for item in ast.walk(target))
                 yield from (item.attr for item in items if isinstance(item, ast.Attribute))
-        for item in (statement for class_ in self.classes for statement in class_.body):
-            if isinstance(item, Function | ast.ClassDef):
-                yield item.name
-            elif isinstance(item, ast.Assign | ast.AnnAssign):
-                yield from (node.id for node in ast.walk(item) if isinstance(node, ast.Name))
+        for statement in (item for class_ in self.classes for item in class_.body):
+            if isinstance(statement, Function | ast.ClassDef):
+                yield statement.name
+            elif isinstance(statement, ast.Assign | ast.AnnAssign):
+                yield from (x.id for x in ast.walk(statement) if isinstance(x, ast.Name))
 
     @property
     def sets_computed_names(self) -> bool:
@@ -247,6 +185,12 @@ def arguments_of(function: Function) -> list[ast.arg]:
     return [*positional_arguments(function), *function.args.kwonlyargs]
 
 
+def targets_of(node: _Assignment) -> list[ast.expr]:
+    """Return what an assignment gives values to."""
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+    return [item for target in targets for item in getattr(target, "elts", (target,))]
+
+
 def _by_line(nodes: Iterable[_Statement]) -> Mapping[int, list[_Statement]]:
     """Return the statements that contain each line."""
     found: dict[int, list[_Statement]] = {}
@@ -256,24 +200,24 @@ def _by_line(nodes: Iterable[_Statement]) -> Mapping[int, list[_Statement]]:
     return found
 
 
-def _loads_without_uses(scope: ast.AST) -> Counter[str]:
-    """Return how often each name is read other than by its members or as an argument."""
-    balance: Counter[str] = Counter()
+def _made_class(value: ast.expr) -> str:
+    """Return the class of which a call makes an object, or the type of a port; else ""."""
+    if not isinstance(value, ast.Call):
+        return ""
+    is_port = called_name(value).startswith("create_") and value.args
+    name = last_name(value.args[0] if is_port else value.func)
+    return name if name[:1].isupper() else ""
+
+
+def _checks_in(scope: ast.AST) -> Iterator[ast.AST]:
+    """Yield the expressions that code compares, tests, stores or returns."""
     for node in ast.walk(scope):
-        if isinstance(node, ast.Attribute | ast.Name) and isinstance(node.ctx, ast.Load):
-            balance[dotted(node)] += 1
         match node:
-            case ast.Attribute(value=value) | ast.Subscript(value=value):
-                used = [value]
-            case ast.BinOp(left=left, right=right):
-                used = [left, right]
-            case ast.Call(func=function, args=arguments, keywords=keywords):
-                used = [function, *arguments, *(keyword.value for keyword in keywords)]
-            case _:
-                used = []
-        balance.subtract(map(dotted, used))
-    return balance
-
-
-def _holds(node: ast.stmt, line: int) -> bool:
-    return node.lineno <= line <= (node.end_lineno or node.lineno)
+            case ast.Compare() | ast.BoolOp() | ast.UnaryOp():
+                yield from ast.iter_child_nodes(node)
+            case ast.If(test=value) | ast.IfExp(test=value) | ast.While(test=value):
+                yield value
+            case ast.Assert(test=value) | ast.Match(subject=value) | ast.comprehension(iter=value):
+                yield value
+            case ast.Assign(value=value) | ast.AnnAssign(value=value) | ast.Return(value=value):
+                yield from (value, *getattr(value, "elts", ())) if value is not None else ()

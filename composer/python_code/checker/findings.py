@@ -15,7 +15,7 @@ from dataclasses import field
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
-from composer.python_code.checker.code_index import CodeIndex
+from composer.python_code.checker.code_index import CodeIndex, targets_of
 from composer.python_code.checker.imports import Imports
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding
@@ -65,7 +65,6 @@ MISSING_RETURN = "missing an explicit `return`"
 _NAME = r"Could not find name `(\w+)`"
 _FUNCTION = r"in function `([\w.]+)`"
 _CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
-_MANY = 50  # names that a misspelled import may have bound
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
 _OF_MESSAGE = r"(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)"
@@ -94,8 +93,6 @@ class Reader:
     span: Span
     #: What is wrong: of several problems with the same name, type or call, the first is reported.
     about: list[str] = field(default_factory=list)
-    #: What further problems are about that follow from this one.
-    follow_ups: list[str] = field(default_factory=list)
 
     @property
     def _is_class(self) -> bool:
@@ -141,19 +138,11 @@ class Reader:
             failed = missing(module, wanted)
         if failed is None:
             return None
-        self._is_meant(failed.part)
         if failed.home is not None:  # one report for all names that are there
             self.about.append(f"line {node.lineno} {failed.home}")
         place = re.search(rf"\b{re.escape(failed.part)}\b", self.span.text)
         self.span = self.span.part(place.start() if place else 0, len(failed.part))
-        return Problem(failed.family, failed.message, self.span, failed.hint, failed.is_certain)
-
-    def _is_meant(self, name: str) -> None:
-        """Leave out the names that follow from a misspelled import."""
-        meant = {*vocabulary(tuple(self.code.names)).close(name, _MANY)}
-        if name[:1].isupper():  # another class may have been meant
-            meant |= self.code.class_names
-        self.follow_ups += [f"name {x}" for x in meant]
+        return Problem(failed.family, failed.message, self.span, failed.hint)
 
     def _attribute(self) -> Problem | None:
         in_module = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
@@ -203,8 +192,6 @@ class Reader:
         is_known = is_standard or top in _COMPLETE_MODULES
         if found["imported"] and not is_known:
             return self._import()
-        if found["imported"]:
-            self._is_meant(name)
         own = {item.path.stem for item in self.source.own_modules}
         if not (is_known or top in self.owners.interfaces.packages() or module in own):
             return None  # part of it may be compiled
@@ -241,7 +228,8 @@ class Reader:
         found = re.search(_ASSIGNMENT, self.finding.message)
         if found is None:
             return None
-        target, statement = next(iter(self.code.assigned_at(self.span.line)), (None, None))
+        statement = self.code.assignment_at(self.span.line)
+        target = targets_of(statement)[0] if statement is not None else None
         if not isinstance(target, ast.Attribute):  # a variable may change its kind
             is_annotated = isinstance(statement, ast.AnnAssign)
             return self._in_its_words() if is_annotated and not self._is_class else None
@@ -272,9 +260,9 @@ class Reader:
         elif name in API_CLASSES:
             hint = f"add 'from composer.behavior import {name}'"
         else:
-            initial = name[:1].lower()
-            alike = self.code.names_by_initial.get(initial, ())
-            hint = _did_you_mean(name, alike) or "import it, or define it"
+            module = self.code.module
+            names = {*self.code.names, *module.imports, *module.classes}
+            hint = _did_you_mean(name, sorted(names)) or "import it, or define it"
         return self._in_its_words(hint=hint)
 
     def _missing_self(self) -> Problem | None:

@@ -41,7 +41,6 @@ class FailedImport:
     message: str
     hint: str | None = None
     family: Family = Family.IMPORT
-    is_certain: bool = True
     home: str | None = None
 
 
@@ -59,18 +58,16 @@ class Imports:
         ``wanted`` is the name to import from it, or "".
         """
         relative = name.lstrip(".")
+        is_absolute = relative == name
         top, _, rest = relative.partition(".")
-        packages = self.interfaces.packages() if relative == name else ()
+        packages = self.interfaces.packages() if is_absolute else ()
         if top in packages and rest.partition(".")[0] in FOLDERS:  # maybe a private module
             return self.missing_name(name, wanted) if rest in FOLDERS and wanted else None
-        exists = any(module_below(base, relative.split(".")) for base in self._folders(name))
-        if exists or (relative == name and _is_installed(name)):
-            if top != "composer":
-                return None
-            message = f"'{name}' is internal to the composer and may change without notice"
-            hint = "behaviors import from 'composer.behavior' only"
-            return FailedImport(name, message, hint, is_certain=False)
-        if top in sys.stdlib_module_names and relative == name:
+        if any(module_below(base, relative.split(".")) for base in self._folders(name)):
+            return None
+        if is_absolute and _is_installed(name):
+            return None
+        if top in sys.stdlib_module_names and is_absolute:
             return self._failed(rest or top, f"no module named '{name}'")
         nearby = nearby_modules(relative, self._folders(name))
         if rest and nearby.missing in packages:  # only its definitions are here, as without ROS
@@ -78,11 +75,8 @@ class Imports:
         names = {*nearby.names}
         if nearby.package in packages:
             names.update(FOLDERS)
-        elif not nearby.package and relative == name:
+        elif not nearby.package and is_absolute:
             names.update(_USUAL, packages)
-        is_complete = nearby.package in (*packages, "rclpy") or not nearby.may_be_compiled
-        if nearby.missing in names or not is_complete:
-            return None
         message = f"no module named '{name.removesuffix(relative)}{nearby.path}'"
         return self._misspelled(nearby.missing, message, names, " is installed")
 
@@ -100,17 +94,14 @@ class Imports:
             hint = suggestion(name, others) if home is None else f"import it from '{home}'"
             return self._failed(name, message, hint, home)
         last = module.rpartition(".")[2]
-        files = [item for item in self.source.own_modules if item.path.stem == last]
-        packages = [item for item in self.source.own_modules if item.path.parent.name == last]
-        names = {other for item in files or packages for other in defined_names(item)}
-        if any(item.dynamic for item in files or packages):
+        own = self.source.own_modules
+        files = [item for item in own if last in (item.path.stem, item.path.parent.name)]
+        if (last and not files) or any(item.dynamic for item in files):
             return None
-        if files:
+        names = {other for item in files for other in defined_names(item)}
+        if any(item.path.stem == last for item in files):
             return self._failed(name, message, suggestion(name, names))
         nearby = nearby_modules(f"{module.lstrip('.')}.{name}".lstrip("."), self._folders(module))
-        is_own = packages or module == "." * len(module)
-        if nearby.may_be_compiled or name in nearby.names or not is_own:
-            return None
         return self._misspelled(name, message, names.union(nearby.names))
 
     def _folders(self, name: str) -> list[Path]:
@@ -124,18 +115,15 @@ class Imports:
 
     def _home(self, package: str, folder: str, name: str) -> str | None:
         """Return the only module that has an interface: in a package, or any."""
-        own = [f"{package}.{part}" for part in sorted(FOLDERS)]
-        others = [f"{other}.{folder}" for other in self.interfaces.packages() if folder]
-        for modules in (own, others):
-            paths = {home: f"{home.replace('.', '/')}/{name}" for home in modules}
-            homes = [home for home, path in paths.items() if self.interfaces.find(path)]
-            if homes:
-                return homes[0] if len(homes) == 1 else None
-        return None
+        listed = (item.split("/") for each in FOLDERS for item in self.interfaces.names(each))
+        homes = [item[:2] for item in listed if item[2] == name]
+        own = [home for home in homes if home[0] == package]
+        homes = own or [home for home in homes if home[1] == folder]
+        return ".".join(homes[0]) if len(homes) == 1 else None
 
     def _misspelled(
         self, name: str, message: str, names: Iterable[str], where: str = ""
-    ) -> FailedImport:
+    ) -> FailedImport | None:
         """Return the problem of a name: an error if another one was meant, else an info.
 
         ``where`` ends the message of an info.
@@ -143,6 +131,8 @@ class Imports:
         limit = 2 if len(name) >= _LONG_NAME else 1
         near = [(edit_distance(name, other), other) for other in names if other[:1] == name[:1]]
         distance, close = min(near, default=(limit + 1, ""))
+        if distance == 0:
+            return None  # it exists, but the checker cannot read it
         if distance <= limit:
             return self._failed(name, message, f"did you mean '{close}'?")
         hint = "install it, or correct the name"

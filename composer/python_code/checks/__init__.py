@@ -13,14 +13,9 @@ from composer.python_code.checks.node_classes import node_class_problems
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.problems import Family, Problem
-from composer.python_code.trees import argument, dotted
+from composer.python_code.trees import argument
 
 __all__ = ["code_problems"]
-
-#: Methods of goals, ports and timers that have no meaning as plain attributes.
-_METHODS = frozenset(
-    {"abort", "cancel", "canceled", "destroy", "publish", "publish_feedback", "reset", "succeed"}
-)
 
 #: Texts that show that a file may run an event loop of asyncio, such as in a thread.
 _RUNS_ASYNCIO = (
@@ -37,27 +32,11 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
     code = Code(node, source, interfaces)
     for scope in code.scopes:
         yield from message_problems(scope)
-        yield from _unused_values(scope)
         yield from _awaited(scope, is_behavior=node.behavior is not None)
     if node.behavior is not None:
         yield from behavior_problems(code)
     else:
         yield from node_class_problems(code)
-
-
-def _unused_values(scope: NodeScope) -> Iterator[Problem]:
-    """Yield the comparisons that are not used, and the methods that are not called."""
-    for node in scope.nodes:
-        match node:
-            case ast.Expr(value=ast.Compare(ops=[ast.Eq(), *_]) as value):
-                message = "the result of this comparison is not used"
-                yield scope.problem(Family.UNUSED, message, value, "assign with '='")
-            case ast.Expr(value=ast.Attribute(attr=name) as value):
-                method = scope.code.source.method(name) if scope.method is not None else None
-                is_own = dotted(value) == f"self.{name}" and method is not None and method.known
-                if is_own or name in _METHODS:
-                    message = f"'{name}' is not called"
-                    yield scope.problem(Family.UNUSED, message, value, "add '()'")
 
 
 def _awaited(scope: NodeScope, *, is_behavior: bool) -> Iterator[Problem]:

@@ -9,7 +9,6 @@ class Counter:
     async def on_tick(self):
         self.report()
         self.publishers.point.publish()
-        self.count == 1
         self.count = self.count + "1"
         self.publishers.point.publish(Point(x=1))
         await asyncio.sleep(0.1)

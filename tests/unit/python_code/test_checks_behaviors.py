@@ -130,11 +130,6 @@ FILES = [
     """,
     """
     class Robot:
-        def on_fibonacci(self, goal):
-            goal.succeed  # UNUSED
-    """,
-    """
-    class Robot:
         async def on_tick(self):
             goal = await self.action_clients.count.send_goal(None, on_feedback=self.show)
             await self.action_clients.count.send_goal(None, on_feedback=lambda: 1)
@@ -154,19 +149,6 @@ FILES = [
 
         async def on_fibonacci(self, goal):
             return None
-    """,
-    """
-    class Robot:
-        def on_tick(self):
-            self.count == 1  # UNUSED
-            self.count != 1
-            self.on_tick  # UNUSED
-            self.name
-            self.publishers.velocity.publish  # UNUSED
-            try:
-                self.count
-            except AttributeError:
-                self.count = 0
     """,
 ]
 

@@ -211,22 +211,6 @@ FILES = [
     """,
     """
     class Robot(Node):
-        def __init__(self):
-            super().__init__('robot')
-            self.client = ActionClient(self, Fibonacci, 'a')
-
-        def on_tick(self):
-            self.client.wait_for_server
-            self.on_tick  # UNUSED
-            self.publisher.publish  # UNUSED
-            self.timer.reset  # UNUSED
-            self.client == 1  # UNUSED
-
-        def helper():
-            pass
-    """,
-    """
-    class Robot(Node):
         def build():
             return 1
 
@@ -244,16 +228,6 @@ FILES = [
 
         def on_tick(self):
             self.create_timer(lambda: None, lambda event: None)
-    """,
-    """
-    class Robot(Node):
-        def __init__(self):
-            super().__init__('robot')
-            self.create_subscription(String, 'a', self.on_a, 10)
-
-        def on_a(self, message):
-            if message.data == 3:  # VALUE?
-                pass
     """,
 ]
 
