@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 
@@ -14,7 +13,6 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 #: Code in one of these does not run where it is written.
 SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
-_PRIVATE_INTERFACE = re.compile(r"(\w+\.(?:msg|srv|action))\._\w+")
 #: Columns in longer lines are not exact, because counting takes quadratic time.
 _LONGEST_LINE = 10_000
 
@@ -66,19 +64,9 @@ def imports_in(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, Import]]:
     for node in nodes:
         if isinstance(node, ast.ImportFrom):
             for item in node.names:
-                module = public_module(node.module or "")
-                yield item.asname or item.name, Import(module, item.name, node.level)
+                yield item.asname or item.name, Import(node.module or "", item.name, node.level)
         elif isinstance(node, ast.Import):
             yield from ((item.asname or item.name, Import(item.name, "")) for item in node.names)
-
-
-def public_module(name: str) -> str:
-    """Return ``std_srvs.srv`` for ``std_srvs.srv._trigger``, and any other module as it is.
-
-    Editors complete imports of interfaces with the private modules that define them.
-    """
-    match = _PRIVATE_INTERFACE.fullmatch(name)
-    return match[1] if match is not None else name
 
 
 def full_names(imports: Iterable[tuple[str, Import]]) -> dict[str, str]:

@@ -55,27 +55,28 @@ class Check:
     def problems(self) -> list[tuple[str, Problem]]:
         """Wait for the problems, each with the name of its file. Raises CheckerFailed.
 
-        One wrong name, type or call has one report for each file, where it is first used.
+        A line has one report of each family, and a file one of each message.
         """
         findings = self._process.findings()
         owners = Owners(self._files.behaviors, self._interfaces)
         found = list(self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS}))
-        seen: set[tuple[str, str]] = set()
-        wrong_imports: set[str] = set()
+        seen: set[tuple[object, ...]] = set()
+        wrong_imports = set()
         for finding, span, code, relevance in self._relevant(findings, owners):
-            source = self._files.files[finding.path].source
-            reader = Reader(finding, source, code, relevance, owners, span)
-            problem = reader.problem()
-            keys = {(finding.path, about) for about in reader.about}
-            if problem is not None:
-                if finding.kind != "missing-import":  # all places of one are shown together
-                    keys.add((finding.path, problem.message))
-                if problem.family is Family.IMPORT:  # the name that was meant may be used
-                    wrong_imports.add(finding.path)
-                if problem.family is Family.NAME and finding.path in wrong_imports:
-                    continue
-                if seen.isdisjoint(keys):
-                    found.append((finding.path, problem))
+            path = finding.path
+            source = self._files.files[path].source
+            problem = Reader(finding, source, code, relevance, owners, span).problem()
+            if problem is None:
+                continue
+            keys: set[tuple[object, ...]] = {(path, problem.span.line, problem.family)}
+            if finding.kind != "missing-import":  # all places of one are shown together
+                keys.add((path, problem.message))
+            if problem.family is Family.IMPORT:
+                wrong_imports.add(path)
+            # A name may be the one that a wrong import should bind.
+            is_follow_up = problem.family is Family.NAME and path in wrong_imports
+            if seen.isdisjoint(keys) and not is_follow_up:
+                found.append((path, problem))
             seen |= keys
         return found + [
             (path, Problem(Family.NOT_CHECKED, _TOO_MANY, span)) for path, span in self._unread

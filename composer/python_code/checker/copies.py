@@ -25,8 +25,6 @@ from composer.python_code.trees import (
     dotted,
     is_none,
     positional_arguments,
-    public_module,
-    walk,
 )
 
 #: The line that a copy gets, so that annotations can name what they need.
@@ -56,7 +54,6 @@ class Copy:
 def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool) -> Copy:
     """Return the copy of a file for the checker; ``classes`` has edits by the name of a class."""
     edits = _Edits(module.source.text.split("\n"))
-    edits.import_interfaces(module.tree)
     names: set[str] = set()
     for class_ in module.classes.values():
         edits.remove_unset_attributes(class_.node, stays_none=is_behavior)
@@ -91,16 +88,6 @@ class _Edits:
             self.lines.insert(after + count, text)
             numbers.add(after + count + 1)
         return Copy(module, "\n".join(self.lines), frozenset(numbers))
-
-    def import_interfaces(self, tree: ast.Module) -> None:
-        """Import interfaces from modules that have stubs: see ``public_module``."""
-        for node in walk(tree.body, closed=(ast.expr,)):
-            if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                public = public_module(node.module)
-                if public != node.module:
-                    line = self.lines[node.lineno - 1]
-                    name = public.ljust(len(node.module))
-                    self.lines[node.lineno - 1] = line.replace(node.module, name, 1)
 
     def remove_unset_attributes(self, node: ast.ClassDef, *, stays_none: bool) -> None:
         """Remove ``self.last = None`` from the constructor if another method sets a value.
@@ -151,12 +138,15 @@ class _Edits:
             self._annotate_result(node, signature.result)
 
     def _annotate_result(self, function: Function, result: str) -> None:
-        place = _end_of_signature(function, self.lines)
-        if function.returns is None and place is not None:
-            number, column = place
-            line = self.lines[number - 1]
-            self.lines[number - 1] = f"{line[:column]} -> {result}{line[column:]}"
-        elif function.returns is not None and is_none(function.returns):  # by habit
+        if function.returns is None:
+            for number in range(function.body[0].lineno - 1, function.lineno - 1, -1):
+                line = self.lines[number - 1]
+                closing = re.match(r"[^#]*\)(?=\s*:\s*(#.*)?$)", line)
+                if closing is not None:
+                    end = closing.end()
+                    self.lines[number - 1] = f"{line[:end]} -> {result}{line[end:]}"
+                    return
+        elif is_none(function.returns):  # by habit
             number, line = function.returns.lineno, self.lines[function.returns.lineno - 1]
             start = characters(line, function.returns.col_offset)
             self.lines[number - 1] = f"{line[:start]}{result}{line[start + 4 :]}"
@@ -188,22 +178,6 @@ def _is_generic(annotation: ast.expr, type_: str) -> bool:
     """Return whether an annotation such as ``ServerGoalHandle`` lacks the types in brackets."""
     name, bracket, _ = type_.partition("[")
     return bool(bracket) and dotted(annotation).rpartition(".")[2] == name.rpartition(".")[2]
-
-
-def _end_of_signature(function: Function, lines: list[str]) -> tuple[int, int] | None:
-    """Return the place after the closing parenthesis of a function, None if it is not found."""
-    arguments = [*positional_arguments(function), *function.args.kwonlyargs]
-    defaults = [*function.args.defaults, *function.args.kw_defaults]
-    parts = (item for item in (*arguments, *defaults) if item is not None)
-    ends = [(item.end_lineno or 0, item.end_col_offset or 0) for item in parts]
-    first, column = max(ends, default=(function.lineno, function.col_offset))
-    for number in range(first, function.body[0].lineno + 1):
-        line = lines[number - 1]
-        start = characters(line, column) if number == first else 0
-        closing = re.compile(r"\)(?=\s*:)").search(line, start)
-        if closing is not None:
-            return number, closing.end()
-    return None
 
 
 def _lines_of_head(tree: ast.Module) -> int:

@@ -10,14 +10,13 @@ import ast
 import re
 import sys
 from collections.abc import Iterable
-from dataclasses import field
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
-from composer.python_code.checker.code_index import CodeIndex, targets_of
+from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
-from composer.python_code.checker.owners import Owners
+from composer.python_code.checker.owners import Owners, public_names
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.checker.relevance import Relevance, is_parameter, unguarded_value
 from composer.python_code.lookup import BehaviorSource
@@ -63,7 +62,6 @@ _ASSIGNMENT = (
 )
 MISSING_RETURN = "missing an explicit `return`"
 _NAME = r"Could not find name `(\w+)`"
-_FUNCTION = r"in function `([\w.]+)`"
 _CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
@@ -91,8 +89,6 @@ class Reader:
     relevance: Relevance
     owners: Owners
     span: Span
-    #: What is wrong: of several problems with the same name, type or call, the first is reported.
-    about: list[str] = field(default_factory=list)
 
     @property
     def _is_class(self) -> bool:
@@ -113,15 +109,9 @@ class Reader:
         return Problem(family, message, self.span, hint)
 
     def _in_its_words(self, family: Family | None = None, hint: str | None = None) -> Problem:
-        function = re.search(_FUNCTION, self.finding.message)
-        if function is not None:
-            self._is_about_call(function[1])
         text = _plain(self.finding.message.partition("\n")[0]).replace("`", "'")
         family = family or _FAMILIES.get(self.finding.kind, Family.TYPE)
         return self._made(family, text[:1].lower() + text[1:], hint)
-
-    def _is_about_call(self, called: str) -> None:
-        self.about.append(f"line {self.span.line} {called}")
 
     def _import(self) -> Problem | None:
         node = self.code.import_at(self.span.line)
@@ -138,8 +128,6 @@ class Reader:
             failed = missing(module, wanted)
         if failed is None:
             return None
-        if failed.home is not None:  # one report for all names that are there
-            self.about.append(f"line {node.lineno} {failed.home}")
         place = re.search(rf"\b{re.escape(failed.part)}\b", self.span.text)
         self.span = self.span.part(place.start() if place else 0, len(failed.part))
         return Problem(failed.family, failed.message, self.span, failed.hint)
@@ -165,16 +153,12 @@ class Reader:
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
         if owner is not None:
-            self._is_about_call(named)
             return self._in_its_words(owner.family, owner.hint(name))
         is_stored = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
         if is_stored and not is_own:
             return None  # most objects take any attribute
-        if not is_own:
-            self.about.append(f"type {named}")
-        names = self.owners.attributes if is_own and not self._is_class else ()
-        hint = _meant(self.finding.message) or _did_you_mean(name, names)
-        return self._in_its_words(hint=hint)
+        names = public_names("Behavior") if is_own and not self._is_class else ()
+        return self._in_its_words(hint=_meant(self.finding.message) or _did_you_mean(name, names))
 
     def _unawaited_value(self) -> Problem:
         """Return the problem of a name that was assigned without 'await', where it was."""
@@ -197,10 +181,10 @@ class Reader:
             return None  # part of it may be compiled
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
+        family = Family.IMPORT if found["imported"] else Family.ATTRIBUTE
         is_loaded = module in sys.modules and (is_standard or top == "composer")
         names = dir(sys.modules[module]) if is_loaded else ()
         hint = _did_you_mean(name, names) or _meant(self.finding.message)
-        family = Family.IMPORT if found["imported"] else Family.ATTRIBUTE
         return self._in_its_words(family, hint)
 
     def _argument(self) -> Problem | None:
@@ -216,26 +200,12 @@ class Reader:
             return self._in_its_words(Family.SIGNATURE, f"write '{name}' without '()'")
         hint = _part_hint(expected, given)
         if function in _SENDING:
-            self.about.append(f"type {given}")
             message = f"{_SENDING[function]} {_plain(expected)}, not {_plain(given)}"
             return self._made(Family.MESSAGE_TYPE, message, hint)
         if expected.startswith("Float") and _plain(given).lstrip("-").isdigit():
             hint = f"write {_plain(given)}.0"
         is_field = re.fullmatch(_OF_MESSAGE, function) is not None
         return self._in_its_words(Family.VALUE if is_field else Family.ARGUMENTS, hint)
-
-    def _assignment(self) -> Problem | None:
-        found = re.search(_ASSIGNMENT, self.finding.message)
-        if found is None:
-            return None
-        statement = self.code.assignment_at(self.span.line)
-        target = targets_of(statement)[0] if statement is not None else None
-        if not isinstance(target, ast.Attribute):  # a variable may change its kind
-            is_annotated = isinstance(statement, ast.AnnAssign)
-            return self._in_its_words() if is_annotated and not self._is_class else None
-        is_own = dotted(target.value) == "self" and not self._is_class
-        is_ours = is_own and target.attr in self.owners.attributes
-        return self._in_its_words() if is_ours else None
 
     def _keyword(self) -> Problem:
         called = re.search(
@@ -254,7 +224,6 @@ class Reader:
         name = found[1]
         if name == "self" and self.code.class_at(self.span.line) is not None:
             return self._missing_self()
-        self.about.append(f"name {name}")
         if name in sys.stdlib_module_names:
             hint = f"add 'import {name}'"
         elif name in API_CLASSES:
@@ -309,7 +278,6 @@ class Reader:
         message = f"'{name}' may be None here"
         if name.startswith("self."):
             message = f"'{name}' is None until another callback has set it"
-        self.about.append(f"none {name}")
         hint = f"check 'if {name} is None' first"
         return Problem(Family.NONE, message, self.span, hint, is_certain=False)
 
@@ -317,7 +285,6 @@ class Reader:
 _READERS = {
     "bad-argument-count": Reader._keyword,
     "bad-argument-type": Reader._argument,
-    "bad-assignment": Reader._assignment,
     "bad-function-definition": Reader._missing_self,
     "bad-return": Reader._return,
     "missing-attribute": Reader._attribute,

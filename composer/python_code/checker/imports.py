@@ -32,16 +32,12 @@ _LONG_NAME = 8  # letters, of which two may be wrong
 
 @dataclass(frozen=True, slots=True)
 class FailedImport:
-    """What cannot be imported: the wrong part of the name, and what is wrong with it.
-
-    ``home`` is the only module that has the name.
-    """
+    """What cannot be imported: the wrong part of the name, and what is wrong with it."""
 
     part: str
     message: str
     hint: str | None = None
     family: Family = Family.IMPORT
-    home: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +88,7 @@ class Imports:
             if name in others or not (folder or home):
                 return None  # its definition cannot be read, or it may be another module
             hint = suggestion(name, others) if home is None else f"import it from '{home}'"
-            return self._failed(name, message, hint, home)
+            return self._failed(name, message, hint)
         last = module.rpartition(".")[2]
         own = self.source.own_modules
         files = [item for item in own if last in (item.path.stem, item.path.parent.name)]
@@ -138,14 +134,12 @@ class Imports:
         hint = "install it, or correct the name"
         return FailedImport(name, f"{message}{where}", hint, Family.NOT_INSTALLED)
 
-    def _failed(
-        self, part: str, message: str, hint: str | None = None, home: str | None = None
-    ) -> FailedImport:
+    def _failed(self, part: str, message: str, hint: str | None = None) -> FailedImport:
         """Return an error, unless the file searches for modules itself."""
         if any(text in self.module.source.text for text in _AT_RUN_TIME):
             hint = "the file searches for modules itself"
             return FailedImport(part, message, hint, Family.NOT_INSTALLED)
-        return FailedImport(part, message, hint, home=home)
+        return FailedImport(part, message, hint)
 
 
 def _is_installed(name: str) -> bool:

@@ -9,7 +9,7 @@ from functools import cached_property
 from composer import behavior
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
-from composer.interfaces import Interfaces, Message
+from composer.interfaces import Interfaces
 from composer.interfaces.definitions import parts
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
@@ -66,31 +66,20 @@ class Owners:
         is_message = bool(full_names) and not is_of_rclpy
         if is_message and (_package(full_names[0]) in used or not is_of_api):
             return self.message(full_names[0])
-        if not is_of_api:
-            return None
-        names = tuple(item for item in dir(getattr(behavior, name)) if not item.startswith("_"))
-        return Owner(Family.PORT, names, is_api=True)
+        return Owner(Family.PORT, public_names(name), is_api=True) if is_of_api else None
 
     def message(self, name: str) -> Owner | None:
         """Return a message, or a part of a service or action, by its full name."""
-        definition = self._definition(name)
+        definition = self.interfaces.message(name)
+        base, _, part = name.rpartition("_")
+        whole = self.interfaces.find(base) if definition is None and base else None
+        if whole is not None:
+            definition = parts(whole).get(part.lower())
         if definition is None:
-            folder = name.split("/")[1]
-            return Owner(Family.FIELD, _PARTS[folder]) if _PARTS[folder] else None
+            members = _PARTS[name.split("/")[1]]
+            return Owner(Family.FIELD, members) if members else None
         constants = (constant.name for constant in definition.constants)
         return Owner(Family.FIELD, (*definition.field_names, *constants))
-
-    @cached_property
-    def attributes(self) -> frozenset[str]:
-        """The attributes of behaviors that the composer sets."""
-        return frozenset(name for name in behavior.Behavior.__slots__ if name[0] != "_")
-
-    def _definition(self, name: str) -> Message | None:
-        """Return a message by its full name, or the part ``package/srv/Name_Request``."""
-        found = self.interfaces.message(name)
-        base, _, part = name.rpartition("_")
-        whole = self.interfaces.find(base) if found is None and base else None
-        return found if whole is None else parts(whole).get(part.lower())
 
     def _used_packages(self, module: Module) -> set[str]:
         """Return the packages that the module imports or that types of ports belong to."""
@@ -121,6 +110,12 @@ class Owners:
                 for part in _PARTS[folder]:
                     found.setdefault(f"{short}_{part}", []).append(f"{name}_{part}")
         return found
+
+
+def public_names(class_name: str) -> tuple[str, ...]:
+    """Return the attributes of a class of the API for behaviors."""
+    names = dir(getattr(behavior, class_name))
+    return tuple(name for name in names if not name.startswith("_"))
 
 
 def _package(interface: str) -> str:

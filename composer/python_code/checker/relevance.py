@@ -19,8 +19,8 @@ from composer.python_code.trees import dotted, is_none, last_name
 
 #: Kinds that are certain in any class, whatever the annotations say.
 _CERTAIN_KINDS = frozenset(
-    {"bad-argument-count", "bad-assignment", "bad-raise", "missing-argument", "not-callable"}
-    | {"unexpected-keyword", "unused-coroutine"}
+    {"bad-argument-count", "bad-raise", "missing-argument", "not-callable", "unexpected-keyword"}
+    | {"unused-coroutine"}
 )
 #: Kinds that are kept in any code.
 _ALWAYS = frozenset({"invalid-syntax", "missing-import", "missing-module-attribute", "parse-error"})
@@ -85,8 +85,12 @@ class Relevance:
         return is_reassigned or self.code.has_loose_names(span.line)
 
     def _is_kept(self, kind: str, message: str, span: Span) -> bool:
-        if kind in ("implicit-bool", "bad-function-definition"):
+        if kind in ("bad-function-definition", "implicit-bool"):
             return False
+        if kind == "bad-assignment":  # without an annotation, a variable may change its kind
+            statement = self.code.assignment_at(span.line)
+            target = statement.target if isinstance(statement, ast.AnnAssign) else None
+            return isinstance(target, ast.Name) and not self.is_class
         if kind == "bad-return" and self.is_class:  # other annotations may be wrong
             return re.search(_RESULT_FOR_RCLPY, message) is not None
         node = self.code.expression_at(span)

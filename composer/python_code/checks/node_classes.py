@@ -6,20 +6,20 @@ import ast
 from collections.abc import Iterator
 
 from composer.base.diagnostics import nearest
-from composer.python_code.checks.scopes import Code, NodeScope
+from composer.python_code.checks.scopes import Code
 from composer.python_code.lookup import imported_from, is_of_rclpy
 from composer.python_code.nodes import (
     UNDECLARED,
+    calls_on_self,
     declared_parameters,
     passes_node_on,
 )
 from composer.python_code.problems import Family, Problem
-from composer.python_code.trees import catches, dotted, span_of, walk
+from composer.python_code.trees import argument, called_name, catches, dotted, span_of, walk
 
 #: The parameters that every node has.
 _DECLARED = frozenset({"use_sim_time", "start_type_description_service"})
 _READING = frozenset({"describe_parameter", "get_parameter", "get_parameter_type"})
-_ASKING = frozenset({"get_parameters_by_prefix", "has_parameter"})
 _ERRORS = frozenset({"Exception", "ParameterException", "ParameterNotDeclaredException"})
 _TRANSITIONS = frozenset({"activate", "cleanup", "configure", "deactivate", "error", "shutdown"})
 
@@ -30,66 +30,34 @@ def node_class_problems(code: Code) -> Iterator[Problem]:
     if code.source.method("get_parameter") or code.source.method("declare_parameter"):
         return  # they may do something else
     yield from _undeclared(code)
-    for scope in code.scopes:
-        yield from _incomplete_profiles(scope)
 
 
 def _undeclared(code: Code) -> Iterator[Problem]:
     """Yield the parameters that methods read, but that no file declares."""
-    calls = [
-        (scope, node)
-        for scope in code.scopes
-        for node in scope.nodes
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
-    ]
     parameters = declared_parameters(code.source)
     hosted = code.node.hosted_class
     given = {name.value for name, _ in hosted.arguments} if hosted is not None else set()
-    if not parameters.is_complete or not UNDECLARED.isdisjoint(given):
-        return
-    if any(_may_have_others(call, scope) for scope, call in calls):
+    calls = (x for scope in code.scopes for x in scope.nodes if called_name(x) == "__init__")
+    options = (item for call in calls for item in getattr(call, "keywords", ()))
+    is_open = any(item.arg is None and dotted(item.value) != "kwargs" for item in options)
+    if is_open or not parameters.is_complete or not UNDECLARED.isdisjoint(given):
         return
     declared = _DECLARED | parameters.types.keys()
     is_shared = passes_node_on(code.source)
-    for scope, call in calls:
-        is_own = scope.method is not None and dotted(call.func).startswith("self.")
-        is_read = is_own and dotted(call.func).removeprefix("self.") in _READING and call.args
-        read = scope.constant(call.args[0]) if is_read else None
-        if not isinstance(read, str) or read in declared or read.startswith("qos_overrides."):
+    own = {module.source for module in code.source.own_modules}
+    for scope, call, method in calls_on_self(code.source):
+        name = argument(call, 0, "name") if method in _READING and scope.source in own else None
+        read = scope.known(scope.text, name)
+        if name is None or read is None or read in declared or read.startswith("qos_overrides."):
             continue
         close = nearest(read, declared)
-        if (close or not is_shared) and not _catches_errors(scope):
+        is_caught = any(
+            isinstance(x, ast.ExceptHandler) and catches(x, _ERRORS) for x in scope.nodes
+        )
+        if (close or not is_shared) and not is_caught:
             hint = f"did you mean '{close}'?" if close else f"call declare_parameter('{read}')"
             message = f"the class does not declare the parameter '{read}'"
-            yield scope.problem(Family.PARAMETER, message, call.args[0], hint)
-
-
-def _may_have_others(call: ast.Call, scope: NodeScope) -> bool:
-    """Return whether a call shows that parameters come from elsewhere.
-
-    With ``**kwargs``, a constructor passes on the arguments of the node.
-    """
-    name = getattr(call.func, "attr", "")
-    own = scope.function.args.kwarg if scope.function is not None else None
-    passed_on = own.arg if own is not None else None
-    others = (item for item in call.keywords if item.arg is None)
-    is_open = any(dotted(item.value) != passed_on for item in others)
-    return name in _ASKING or (name == "__init__" and is_open)
-
-
-def _catches_errors(scope: NodeScope) -> bool:
-    return any(isinstance(x, ast.ExceptHandler) and catches(x, _ERRORS) for x in scope.nodes)
-
-
-def _incomplete_profiles(scope: NodeScope) -> Iterator[Problem]:
-    """Yield the QoS profiles without history and depth, which rclpy refuses."""
-    for node in scope.nodes:
-        match node:
-            case ast.Call(args=[], keywords=keywords):
-                is_profile = scope.full_name(node.func) == "rclpy.qos.QoSProfile"
-                if is_profile and {"depth", "history", None}.isdisjoint(x.arg for x in keywords):
-                    message = "a QoSProfile needs its depth or its history"
-                    yield scope.problem(Family.ARGUMENTS, message, node, "add 'depth=10'")
+            yield Problem(Family.PARAMETER, message, span_of(name, scope.source), hint)
 
 
 def _missing_calls(code: Code) -> Iterator[Problem]:
