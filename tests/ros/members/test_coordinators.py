@@ -138,7 +138,7 @@ def wait_for_goals(node: str, activity: str) -> None:
     kept = KeptGoals(system_of(TEXT, Path()), goals_path("/lab/robot"))
 
     def are_kept() -> bool:
-        goals, kept_activity = kept.found() or ({}, "")
+        goals, kept_activity = kept.read() or ({}, "")
         return goals.get(node) is PrimaryState.INACTIVE and kept_activity == activity
 
     wait_until(are_kept, "the goals")

@@ -113,6 +113,6 @@ def test_a_failed_run_leaves_a_bag(project: Path) -> None:
     assert f" messages: {bag.relative_to(project)}" in output
     assert open_bag(bag).summary.counts["/sensor_data"] == 151
     words = ("replay", bag, "systems/pipeline.yaml", "--replace", "sensor_simulator")
-    assert "which are equal" in _compose(project, *words, "--compare", bag)
+    assert "equal to the messages of the bag" in _compose(project, *words, "--compare", bag)
     _compose(project, "test", "--bag-on-failure", "-k", "minimal")
     assert list((project / "bags").iterdir()) == [folder]
