@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -367,57 +364,3 @@ def test_a_program_has_the_parameters_of_a_name_that_other_arguments_give(compos
     found = described(nodes, argument("composed", composed))
     assert found.sections == {"/a": {"rate": 2}}
     assert not found.left_out
-
-
-LAUNCH = """\
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
-from launch.substitutions import LaunchConfiguration, PythonExpression
-from launch_ros.actions import Node
-
-def generate_launch_description():
-    sim, model = LaunchConfiguration("sim"), LaunchConfiguration("model")
-    is_burger = PythonExpression(["'", model, "' == 'burger'"])
-    return LaunchDescription([
-        DeclareLaunchArgument("sim", default_value="false", description="Simulate."),
-        DeclareLaunchArgument("lidar", default_value="sick", choices=["sick", "ouster"]),
-        DeclareLaunchArgument("model", default_value="waffle"),
-        DeclareLaunchArgument("map", default_value="/a.yaml"),
-        DeclareLaunchArgument("ip", description="Where it is."),
-        Node(package="p", executable="sim", name="sim", condition=IfCondition(sim)),
-        Node(package="p", executable="base", name="base", condition=UnlessCondition(sim)),
-        Node(package="p", executable="o", name="lidar",
-             condition=LaunchConfigurationEquals("lidar", "ouster")),
-        Node(package="p", executable="b", name="arm", condition=IfCondition(is_burger)),
-        Node(package="p", executable="m", name="map", parameters=[
-            {"use_sim_time": sim, "yaml": LaunchConfiguration("map"),
-             "ip": LaunchConfiguration("ip")}]),
-    ])
-"""
-
-
-@pytest.mark.skipif(find_spec("launch_ros") is None, reason="needs launch_ros")
-def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
-    (tmp_path / "robot.launch.py").write_text(LAUNCH)
-    command = [sys.executable, "-m", "composer", "import", "launch", "robot.launch.py"]
-    subprocess.run([*command, "-o", "robot.yaml"], cwd=tmp_path, check=True, timeout=60)
-    system = yaml.safe_load((tmp_path / "robot.yaml").read_text())
-    assert system["arguments"] == {
-        "sim": {"default": False, "description": "Simulate."},
-        "lidar": {"default": "sick", "choices": ["sick", "ouster"]},
-        "model": "waffle",
-        "map": "/a.yaml",
-        "ip": {"type": "string", "description": "Where it is."},
-    }
-    assert {name: conditions(item) for name, item in system["nodes"].items()} == {
-        "sim": {"if": "sim"},
-        "base": {"unless": "sim"},
-        "lidar": {"if": "lidar == 'ouster'"},
-        "arm": {"if": "model == 'burger'"},
-        "map": {},
-    }
-    values = {name: item["default"] for name, item in system["nodes"]["map"]["parameters"].items()}
-    assert values == {"use_sim_time": "${sim}", "yaml": "${map}", "ip": "${ip}"}
-    [result] = load_files([tmp_path / "robot.yaml"])
-    assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,10 +17,10 @@ from hypothesis import strategies as st
 
 from composer.language.tree import plain
 from composer.launch.conditions import condition
-from composer.loading import load
+from composer.loading import load, load_files
 from composer.model.resolve import OverrideOptions
 from tests.examples import examples
-from tests.unit.bridges.importing.test_launch_arguments import argument, visited
+from tests.unit.bridges.importing.test_launch_arguments import argument, conditions, visited
 from tests.unit.bridges.importing.test_launch_file import node
 
 A, B = ({"a": a, "b": b} for a, b in (("false", "x"), ("false", "y")))
@@ -134,3 +137,57 @@ def test_a_system_starts_what_the_launch_file_starts(
         assert {k: (a, {n: t.lower() for n, t in p.items()}) for k, (a, p) in found.items()} == {
             k: (a, {n: t.lower() for n, t in p.items()}) for k, (a, p) in expected.items()
         }
+
+
+LAUNCH = """\
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    sim, model = LaunchConfiguration("sim"), LaunchConfiguration("model")
+    is_burger = PythonExpression(["'", model, "' == 'burger'"])
+    return LaunchDescription([
+        DeclareLaunchArgument("sim", default_value="false", description="Simulate."),
+        DeclareLaunchArgument("lidar", default_value="sick", choices=["sick", "ouster"]),
+        DeclareLaunchArgument("model", default_value="waffle"),
+        DeclareLaunchArgument("map", default_value="/a.yaml"),
+        DeclareLaunchArgument("ip", description="Where it is."),
+        Node(package="p", executable="sim", name="sim", condition=IfCondition(sim)),
+        Node(package="p", executable="base", name="base", condition=UnlessCondition(sim)),
+        Node(package="p", executable="o", name="lidar",
+             condition=LaunchConfigurationEquals("lidar", "ouster")),
+        Node(package="p", executable="b", name="arm", condition=IfCondition(is_burger)),
+        Node(package="p", executable="m", name="map", parameters=[
+            {"use_sim_time": sim, "yaml": LaunchConfiguration("map"),
+             "ip": LaunchConfiguration("ip")}]),
+    ])
+"""
+
+
+@pytest.mark.skipif(find_spec("launch_ros") is None, reason="needs launch_ros")
+def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
+    (tmp_path / "robot.launch.py").write_text(LAUNCH)
+    command = [sys.executable, "-m", "composer", "import", "launch", "robot.launch.py"]
+    subprocess.run([*command, "-o", "robot.yaml"], cwd=tmp_path, check=True, timeout=60)
+    system = yaml.safe_load((tmp_path / "robot.yaml").read_text())
+    assert system["arguments"] == {
+        "sim": {"default": False, "description": "Simulate."},
+        "lidar": {"default": "sick", "choices": ["sick", "ouster"]},
+        "model": "waffle",
+        "map": "/a.yaml",
+        "ip": {"type": "string", "description": "Where it is."},
+    }
+    assert {name: conditions(item) for name, item in system["nodes"].items()} == {
+        "sim": {"if": "sim"},
+        "base": {"unless": "sim"},
+        "lidar": {"if": "lidar == 'ouster'"},
+        "arm": {"if": "model == 'burger'"},
+        "map": {},
+    }
+    values = {name: item["default"] for name, item in system["nodes"]["map"]["parameters"].items()}
+    assert values == {"use_sim_time": "${sim}", "yaml": "${map}", "ip": "${ip}"}
+    [result] = load_files([tmp_path / "robot.yaml"])
+    assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
