@@ -28,7 +28,7 @@ _POLICIES = (
     "liveliness",
     "liveliness_lease_duration_ms",
 )
-#: Profiles that are reported of those that do not match one profile. A topic hardly has more.
+#: Reports about one profile; few topics have so many profiles that do not match it.
 _MAX_CONFLICTS = 10
 
 #: Endpoints by what these policies are, with the profile of the first one.

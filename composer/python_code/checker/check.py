@@ -73,7 +73,7 @@ class Check:
                 keys.add((path, problem.message))
             if problem.family is Family.IMPORT:
                 wrong_imports.add(path)
-            # A name may be the one that a wrong import should bind.
+            # Maybe it is what a wrong import should bind.
             is_follow_up = problem.family is Family.NAME and path in wrong_imports
             if seen.isdisjoint(keys) and not is_follow_up:
                 found.append((path, problem))

@@ -50,8 +50,8 @@ class Relevance:
     """Decides about the findings in one file.
 
     ``reassigned`` are the names and own attributes that get values of several types, ``attributes``
-    those that any class of the project defines, ``classes`` their names, ``messages`` the messages
-    of ROS.
+    all attributes that classes of the project define, ``classes`` the names of these classes, and
+    ``messages`` the messages of ROS.
     """
 
     code: CodeIndex
