@@ -101,6 +101,9 @@ def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:
     while os.getppid() == process:
         late_s = _late_s()
         poll.poll()
+        if not _unread(wakeup):  # it was woken by something else, which it has not read yet
+            time.sleep(_SAME_REQUEST_S / 2)
+            continue
         time.sleep(_SAME_REQUEST_S)
         # While this process had no processor, a second request may have arrived.
         is_late = _late_s() - late_s > _SAME_REQUEST_S / 2

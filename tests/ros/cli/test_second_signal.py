@@ -144,7 +144,7 @@ def test_a_run_with_a_dashboard(tmp_path: Path) -> None:
         assert not [number for number in processes if Path(f"/proc/{number}").exists()]
 
 
-@pytest.mark.parametrize(("signals", "grace"), [(1, "0.5"), (2, "60")])
+@pytest.mark.parametrize(("signals", "grace"), [(1, "0.5"), (2, "600")])
 def test_a_regular_expression_that_never_ends(tmp_path: Path, signals: int, grace: str) -> None:
     """It keeps the interpreter's lock, so that no signal handler runs."""
     path = tmp_path / "robot.yaml"
