@@ -16,7 +16,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 LIMITED = Path(__file__).with_name("limited.py")
-MAX_CPU = 100  # times the reference work: 2 s if that takes 20 ms
+MAX_CPU = 150  # times the reference work: 3 s if that takes 20 ms
 MAX_MB = 200.0
 PLACE = re.compile(r"--> (.+:\d+:\d+)$", re.MULTILINE)
 SUBSCRIBER = """\
