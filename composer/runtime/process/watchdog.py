@@ -101,7 +101,8 @@ def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:
     while os.getppid() == process:
         late_s = _late_s()
         poll.poll()
-        if not _unread(wakeup):  # it was woken by something else, which it has not read yet
+        if not _unread(wakeup):
+            # It was woken by something else. Until it reads that, poll returns at once.
             time.sleep(_SAME_REQUEST_S / 2)
             continue
         time.sleep(_SAME_REQUEST_S)

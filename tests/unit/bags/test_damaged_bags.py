@@ -34,7 +34,7 @@ number = 0
 while True:
     number += 1
     writer.write(BagMessage("/chat", number, number, b"0123456789"))
-    time.sleep(0.001)
+    time.sleep(0.001)  # a second of it fits into one chunk
 """
 
 
@@ -45,7 +45,7 @@ def test_what_a_killed_process_has_written_can_be_read(tmp_path: Path) -> None:
         until_s = time.monotonic() + 20.0
         while size < 2000 and time.monotonic() < until_s:  # the first chunk, after a second
             size = sum(path.stat().st_size for path in folder.glob("*.mcap"))
-            time.sleep(0.02)
+            time.sleep(0.02)  # poll: nothing announces it
         os.kill(process.pid, signal.SIGKILL)
     bag = open_bag(folder)
     numbers = [item.recorded_ns for item in read(bag)]
