@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import field
 
+from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Interfaces
@@ -61,7 +62,7 @@ class Check:
         owners = Owners(self._files.behaviors, self._interfaces)
         found = list(self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS}))
         seen: set[tuple[object, ...]] = set()
-        wrong_imports = set()
+        wrong_imports: dict[str, list[str]] = {}
         for finding, span, code, relevance in self._relevant(findings, owners):
             path = finding.path
             source = self._files.files[path].source
@@ -72,9 +73,10 @@ class Check:
             if finding.kind != "missing-import":  # all places of one are shown together
                 keys.add((path, problem.message))
             if problem.family is Family.IMPORT:
-                wrong_imports.add(path)
-            # Maybe it is what a wrong import should bind.
-            is_follow_up = problem.family is Family.NAME and path in wrong_imports
+                wrong_imports.setdefault(path, []).append(problem.span.text)
+            is_follow_up = problem.family is Family.NAME and _is_meant(
+                problem.span.text, wrong_imports.get(path, ())
+            )
             if seen.isdisjoint(keys) and not is_follow_up:
                 found.append((path, problem))
             seen |= keys
@@ -127,6 +129,12 @@ class Check:
             for finding, span in in_file:
                 if relevance.keeps(finding, span):
                     yield finding, span, codes[path], relevance
+
+
+def _is_meant(name: str, wrong: Collection[str]) -> bool:
+    """Return whether one of the names that cannot be imported should be ``name``."""
+    is_class = name[:1].isupper() and any(other[:1].isupper() for other in wrong)
+    return is_class or nearest(name, wrong) is not None
 
 
 def _span(finding: Finding, copy: Copy) -> Span:
