@@ -296,13 +296,21 @@ def _pair(item: ast.expr) -> tuple[ast.expr | None, ast.expr | None]:
 
 def passes_node_on(source: BehaviorSource, harmless: frozenset[str] = _OF_ROS) -> bool:
     """Return whether a class passes its object to other code than some packages."""
-    for scope in scopes_in(source.classes):
-        calls = (node for node in scope.nodes if isinstance(node, ast.Call))
-        for call in (x for x in calls if scope.full_name(x.func).partition(".")[0] not in harmless):
-            given = (*call.args, *(keyword.value for keyword in call.keywords))
-            if any(isinstance(item, ast.Name) and item.id == "self" for item in given):
-                return True
-    return False
+    return any(_passes_on(scope, harmless) for scope in scopes_in(source.classes))
+
+
+def _passes_on(scope: Scope, harmless: frozenset[str]) -> bool:
+    uses = 0
+    for node in scope.nodes:
+        match node:
+            case ast.Name(id="self"):
+                uses += 1
+            case ast.Attribute(value=ast.Name(id="self")):
+                uses -= 1
+            case ast.Call() if scope.full_name(node.func).partition(".")[0] in harmless:
+                given = [*node.args, *(keyword.value for keyword in node.keywords)]
+                uses -= sum(getattr(item, "id", None) == "self" for item in given)
+    return uses > 0
 
 
 def calls_on_self(source: BehaviorSource) -> Iterator[tuple[Scope, ast.Call, str]]:

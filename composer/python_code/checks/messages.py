@@ -5,15 +5,20 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from composer.interfaces import FLOATS, Field, FieldType, Message
-from composer.interfaces.field_types.constants import constant_problem, enumerator_problem
+from composer.base.diagnostics import suggestion
+from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
+from composer.interfaces.field_types.constants import (
+    constant_problem,
+    enumerator_problem,
+    enumerators,
+)
 from composer.python_code.checks.scopes import NodeScope
 from composer.python_code.problems import Family, Problem
 from composer.python_code.trees import dotted, span_of
 
 
 def message_problems(scope: NodeScope) -> Iterator[Problem]:
-    """Yield what is assigned to the fields of messages and does not fit, and wrong indices."""
+    """Yield what is assigned to the fields of messages, or compared with them, and does not fit."""
     for node in scope.nodes:
         match node:
             case ast.Assign(targets=targets, value=value):
@@ -28,6 +33,13 @@ def message_problems(scope: NodeScope) -> Iterator[Problem]:
                     yield from _keyword_problems(message, keywords, scope)
             case ast.Subscript(value=owner, slice=index):
                 yield from _index_problem(owner, index, scope)
+            case ast.Compare(
+                left=left,
+                ops=[ast.Eq() | ast.NotEq() | ast.In() | ast.NotIn()],
+                comparators=[right],
+            ):
+                yield from _comparison(left, getattr(right, "elts", [right]), scope)
+                yield from _comparison(right, [left], scope)
 
 
 def _keyword_problems(
@@ -45,10 +57,7 @@ def _field_problems(
     if found is None:
         return
     problems = list(_value_problems(node, found[1].type, scope))
-    yield from problems
-    doubt = enumerator_problem(found[0], found[1].name, scope.constant(node))
-    if doubt is not None and not problems:
-        yield scope.doubt(doubt[0], node, doubt[1])
+    yield from problems or _enumerator_problem(*found, node, scope)
     if found[1].name.endswith("frame_id"):
         yield from _frame_problem(node, scope)
 
@@ -128,3 +137,41 @@ def _index_problem(owner: ast.expr, index: ast.expr, scope: NodeScope) -> Iterat
     if isinstance(at, int) and size is not None and not -size <= at < size:
         hint = f"indices count from 0, so the last one is {size - 1}"
         yield scope.problem(Family.INDEX, f"{array} has no element {at}", index, hint)
+
+
+def _comparison(left: ast.expr, others: list[ast.expr], scope: NodeScope) -> Iterator[Problem]:
+    """Yield the values that a field never has, among those that it is compared with."""
+    found = scope.field(left) if isinstance(left, ast.Attribute) else None
+    if found is None or found[1].type.is_array or not found[1].type.is_primitive:
+        return
+    type_ = found[1].type
+    is_text = type_.name in TEXTS
+    for other in others:
+        value = scope.constant(other)
+        if isinstance(value, str) and not is_text:
+            yield scope.doubt(f"{type_} is never equal to a string", other)
+        elif isinstance(value, int | float) and (is_text or type_.name == "byte"):
+            yield scope.doubt(f"{type_} is never equal to a number", other)
+        else:
+            yield from _enumerator_problem(*found, other, scope)
+
+
+def _enumerator_problem(
+    message: Message, field: Field, node: ast.expr, scope: NodeScope
+) -> Iterator[Problem]:
+    """Yield why a value is none of the constants for a field."""
+    if field.type.is_array:
+        return
+    found = enumerator_problem(message, field.name, scope.constant(node))
+    owner = scope.message_class(node.value) if isinstance(node, ast.Attribute) else None
+    if found is not None:
+        yield scope.doubt(found[0], node, found[1])
+    elif isinstance(node, ast.Attribute) and owner is not None:
+        known = enumerators(message, field.name)
+        if (
+            known
+            and node.attr not in known
+            and any(item.name == node.attr for item in owner.constants)
+        ):
+            text = f"{owner.name} defines {node.attr} for another field than '{field.name}'"
+            yield scope.doubt(text, node, suggestion(node.attr, known))

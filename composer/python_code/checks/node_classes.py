@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from composer.base.diagnostics import nearest
-from composer.python_code.checks.scopes import Code
+from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.lookup import imported_from, is_of_rclpy
 from composer.python_code.nodes import (
     UNDECLARED,
@@ -30,6 +30,8 @@ def node_class_problems(code: Code) -> Iterator[Problem]:
     if code.source.method("get_parameter") or code.source.method("declare_parameter"):
         return  # they may do something else
     yield from _undeclared(code)
+    for scope in code.scopes:
+        yield from _incomplete_profiles(scope)
 
 
 def _undeclared(code: Code) -> Iterator[Problem]:
@@ -37,10 +39,9 @@ def _undeclared(code: Code) -> Iterator[Problem]:
     parameters = declared_parameters(code.source)
     hosted = code.node.hosted_class
     given = {name.value for name, _ in hosted.arguments} if hosted is not None else set()
-    calls = (x for scope in code.scopes for x in scope.nodes if called_name(x) == "__init__")
-    options = (item for call in calls for item in getattr(call, "keywords", ()))
-    is_open = any(item.arg is None and dotted(item.value) != "kwargs" for item in options)
-    if is_open or not parameters.is_complete or not UNDECLARED.isdisjoint(given):
+    if not parameters.is_complete or not UNDECLARED.isdisjoint(given):
+        return
+    if any(map(_has_other_options, code.scopes)):
         return
     declared = _DECLARED | parameters.types.keys()
     is_shared = passes_node_on(code.source)
@@ -58,6 +59,26 @@ def _undeclared(code: Code) -> Iterator[Problem]:
             hint = f"did you mean '{close}'?" if close else f"call declare_parameter('{read}')"
             message = f"the class does not declare the parameter '{read}'"
             yield Problem(Family.PARAMETER, message, span_of(name, scope.source), hint)
+
+
+def _has_other_options(scope: NodeScope) -> bool:
+    """Return whether a constructor gets options from elsewhere than from the node's arguments."""
+    own = scope.function.args.kwarg if scope.function is not None else None
+    passed_on = own.arg if own is not None else None
+    calls = (x for x in scope.nodes if isinstance(x, ast.Call) and called_name(x) == "__init__")
+    options = (item for call in calls for item in call.keywords if item.arg is None)
+    return any(dotted(item.value) != passed_on for item in options)
+
+
+def _incomplete_profiles(scope: NodeScope) -> Iterator[Problem]:
+    """Yield the QoS profiles without history and depth, which rclpy refuses."""
+    for node in scope.nodes:
+        match node:
+            case ast.Call(args=[], keywords=keywords):
+                is_profile = scope.full_name(node.func) == "rclpy.qos.QoSProfile"
+                if is_profile and {"depth", "history", None}.isdisjoint(x.arg for x in keywords):
+                    message = "a QoSProfile needs its depth or its history"
+                    yield scope.problem(Family.ARGUMENTS, message, node, "add 'depth=10'")
 
 
 def _missing_calls(code: Code) -> Iterator[Problem]:

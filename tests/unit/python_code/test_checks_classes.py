@@ -229,6 +229,35 @@ FILES = [
         def on_tick(self):
             self.create_timer(lambda: None, lambda event: None)
     """,
+    """
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot')
+            self.create_subscription(String, 'a', self.on_a, 10)
+
+        def on_a(self, message):
+            if message.data == 3:  # VALUE?
+                pass
+    """,
+    """
+    import json
+
+    class Robot(Node):
+        def __init__(self):
+            kwargs = json.loads('{}')
+            super().__init__('robot', **kwargs)
+            self.get_parameter('rate')
+    """,
+    """
+    from types import SimpleNamespace
+
+    class Robot(Node):
+        def __init__(self):
+            super().__init__('robot')
+            self.helper = SimpleNamespace()
+            self.helper.node = self
+            self.get_parameter('rate')
+    """,
 ]
 
 

@@ -1,4 +1,4 @@
-"""Values of message fields."""
+"""Values of message fields, and constants that they are compared with."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.unit.support.python_checks import check, problems
 IMPORTS = """
 import geometry_msgs.msg
 from composer.behavior import Behavior
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
@@ -52,8 +52,18 @@ WRONG = [
     "pose = PoseStamped()\npose.header.frame_id = '/map'  # FRAME",
     "odometry = Odometry(child_frame_id='/base')  # FRAME",
     "pose = geometry_msgs.msg.PoseStamped()\npose.header.frame_id = '/map'  # FRAME",
+    "status = DiagnosticStatus()\nstatus.level = GoalStatus.STATUS_ABORTED  # VALUE?",
+    "battery = BatteryState()\n"
+    "battery.power_supply_status = BatteryState.POWER_SUPPLY_HEALTH_GOOD  # VALUE?",
     "BatteryState(power_supply_status=9)  # VALUE?",
+    "battery = BatteryState()\nif battery.power_supply_status == 'full':  # VALUE?\n    pass",
+    "battery = BatteryState()\nif battery.power_supply_status == 12:  # VALUE?\n    pass",
+    "battery = BatteryState()\nif battery.power_supply_status in (1, 12):  # VALUE?\n    pass",
+    "fix = NavSatFix()\nif fix.status.status == NavSatStatus.SERVICE_GPS:  # VALUE?\n    pass",
+    "status = DiagnosticStatus()\nif status.level == 2:  # VALUE?\n    pass",
+    "text = String()\nif text.data == 1:  # VALUE?\n    pass",
     "Range(radiation_type=4)  # VALUE?",
+    "status = DiagnosticArray().status[0]\nif status.level != 0:  # VALUE?\n    pass",
 ]
 RIGHT = [
     "UInt8(data=255)",
@@ -78,6 +88,7 @@ RIGHT = [
     "status = DiagnosticStatus(level=b'\\x00')\nstatus.name = str(3)",
     "Trigger.Response(success=1)",
     "status = DiagnosticStatus()\nstatus.level = DiagnosticStatus.ERROR",
+    "status = DiagnosticStatus(level=b'\\x02')\nif status.level == b'\\x02':\n    pass",
     "battery = BatteryState()\nbattery.power_supply_status = BatteryState.POWER_SUPPLY_STATUS_FULL",
     "battery = BatteryState()\nbattery.voltage = 24.0\nif battery.percentage == 0:\n    pass",
     "fix = NavSatFix()\nfix.status.service = NavSatStatus.SERVICE_GPS",
@@ -88,6 +99,7 @@ RIGHT = [
     "twist = Twist()\ntwist.linear.x = 1.0\ntwist.nothing = 5000",
     "Twist = str\nTwist(data=3)",
     "response = Trigger.Response(success=True, message='done')",
+    "if odom.header.frame_id == '/map':\n    pass",
     "value = [0.0]\nvalue.append(1)\nImu(orientation_covariance=value)",
 ]
 
@@ -137,6 +149,16 @@ FILES = [
         def on_tick(self):
             UInt8 = dict
             return UInt8(data=300)
+    """,
+    """
+    from sensor_msgs.msg import BatteryState
+
+    class Robot:
+        def on_battery(self, message):
+            if message.power_supply_health == 40:  # VALUE?
+                return
+            if message.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_FULL:
+                return
     """,
 ]
 
