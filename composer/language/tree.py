@@ -109,6 +109,17 @@ def plain(tree: Tree) -> Plain:
             return {entry.name: plain(entry.value) for entry in tree}
 
 
+def count_values(tree: Tree) -> int:
+    """Return the number of values in ``tree``, with maps and lists; keys count as values."""
+    match tree:
+        case Scalar():
+            return 1
+        case Sequence(items=items):
+            return 1 + sum(map(count_values, items))
+        case Mapping(entries=entries):
+            return 1 + len(entries) + sum([count_values(entry.value) for entry in entries])
+
+
 def describe(tree: Tree) -> str:
     """Return what ``tree`` is: ``a map``, ``nothing``, ``the number 5``, ``the string 'abc'``."""
     match tree:

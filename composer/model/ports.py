@@ -80,13 +80,7 @@ class PortKind(StrEnum):
     @property
     def channel(self) -> ChannelKind:
         """The kind of channel of such a port."""
-        match self:
-            case PortKind.PUBLISHER | PortKind.SUBSCRIPTION:
-                return ChannelKind.TOPIC
-            case PortKind.SERVICE | PortKind.CLIENT:
-                return ChannelKind.SERVICE
-            case PortKind.ACTION_SERVER | PortKind.ACTION_CLIENT:
-                return ChannelKind.ACTION
+        return _CHANNELS[self]
 
 
 class ChannelKind(StrEnum):
@@ -100,6 +94,16 @@ class ChannelKind(StrEnum):
     def interface_folder(self) -> str:
         """The middle part of its interface names: ``msg``, ``srv`` or ``action``."""
         return {"topic": "msg", "service": "srv", "action": "action"}[self.value]
+
+
+_CHANNELS = {
+    PortKind.PUBLISHER: ChannelKind.TOPIC,
+    PortKind.SUBSCRIPTION: ChannelKind.TOPIC,
+    PortKind.SERVICE: ChannelKind.SERVICE,
+    PortKind.CLIENT: ChannelKind.SERVICE,
+    PortKind.ACTION_SERVER: ChannelKind.ACTION,
+    PortKind.ACTION_CLIENT: ChannelKind.ACTION,
+}
 
 
 class Delivery(StrEnum):

@@ -8,17 +8,15 @@ another rule reports that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Severity, in_order
 from composer.language.document.limits import LimitedDiagnostics, TooManyErrors
-from composer.rules.analysis.context import Context, location
+from composer.rules.analysis.context import Check, Context, location
 from composer.rules.analysis.formatting import with_short_values
-
-Check = Callable[[Context], Iterator[Diagnostic]]
 
 
 def run_checks(context: Context) -> list[Diagnostic]:

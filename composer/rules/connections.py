@@ -13,7 +13,7 @@ from composer.base.spelling import vocabulary
 from composer.language.document.limits import MAX_ERRORS
 from composer.model import ChannelKind, PortKind, PortOfNode, channels
 from composer.model.names import join, matches_wildcard
-from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.context import Context, is_unresolved, limited
 from composer.rules.analysis.formatting import port_name
 from composer.rules.analysis.subjects import earlier_errors, wiring
 
@@ -227,6 +227,7 @@ _UNCONNECTED = {
 }
 
 
+@limited
 def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
     """Check for topics, services and actions that have ports of one side only."""
     for kind, (rule, not_done, done) in _UNCONNECTED.items():

@@ -10,7 +10,7 @@ from composer.base.source import Located
 from composer.language.rules import CYCLE, UNUSED_DECLARATION
 from composer.model import ChannelKind, NamedQos, Port, PortKind, PortOfNode
 from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
-from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.context import Context, is_unresolved, limited
 from composer.rules.analysis.formatting import number, port_name
 from composer.rules.analysis.rates import rates, timed_publishers
 from composer.rules.analysis.subjects import earlier_errors, unknown_subjects
@@ -112,6 +112,7 @@ def _profile_cycle(cycle: list[NamedQos]) -> Diagnostic:
     return Diagnostic(CYCLE, message, places[0].span, tuple(labels), hint)
 
 
+@limited
 def check_qos_implicit(context: Context) -> Iterator[Diagnostic]:
     """Check publishers and subscriptions; services and actions have one usual profile."""
     affected = context.once(earlier_errors).nodes

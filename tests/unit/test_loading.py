@@ -133,3 +133,24 @@ def test_a_node_type_is_checked_alone(tmp_path: Path, interfaces: Interfaces) ->
     assert errors(loading) == ["camera.yaml:2 class-missing"]
     (tmp_path / "nodes" / "camera.py").write_text("class Camera: ...\n")
     assert errors(load(path, interfaces=interfaces)) == []
+
+
+@pytest.mark.parametrize(
+    ("port", "rule"),
+    [
+        ("subscriptions: {s: {type: std_msgs/msg/String}}", "subscription-without-publisher"),
+        ("publishers: {p: {type: std_msgs/msg/String, external: true}}", "qos-implicit"),
+    ],
+)
+@pytest.mark.parametrize(("limit", "reported"), [(2, 3), (4, 4)])
+def test_what_most_ports_lack_is_reported_a_limited_number_of_times(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, port: str, rule: str, limit: int, reported: int
+) -> None:
+    monkeypatch.setattr("composer.rules.analysis.context.MAX_FINDINGS", limit)
+    nodes = "".join(f"  node_{number}: {{{port}}}\n" for number in range(4))
+    loading = load(write(tmp_path, f"system: robot\nnodes:\n{nodes}"))
+    found = [item for item in loading.diagnostics if item.rule.name == rule]
+    notes = [item for item in loading.diagnostics if item.rule.name == "too-large"]
+    assert len(found) == reported
+    assert [item.primary.line for item in notes] == ([5] if reported < 4 else [])
+    assert loading.is_runnable

@@ -28,6 +28,9 @@ MAX_ENTRIES = 5_000
 #: Errors of one stage of checking a file.
 MAX_ERRORS = 500
 
+#: Diagnostics of a check of each port that reports no errors.
+MAX_FINDINGS = 5_000
+
 #: Copies made by all ``for_each`` of one file.
 MAX_COPIES = 5_000
 

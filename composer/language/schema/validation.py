@@ -57,9 +57,10 @@ class _Validator:
 
     def properties(self, value: Any, schema: dict[str, Any], path: Path) -> Iterator[SchemaError]:
         if type(value) is dict:
-            for name, part in schema["properties"].items():
-                if name in value:
-                    yield from self.errors(value[name], part, (*path, name))
+            parts = schema["properties"]
+            for name in value:
+                if name in parts:
+                    yield from self.errors(value[name], parts[name], (*path, name))
 
     def others(self, value: Any, schema: dict[str, Any], path: Path) -> Iterator[SchemaError]:
         """Check the keys that ``properties`` does not name."""
@@ -102,8 +103,9 @@ _NUMBERS = _PYTHON_TYPES["number"]
 
 
 def _has_type(value: Any, required: str | list[str]) -> bool:
-    names = [required] if isinstance(required, str) else required
-    return any(type(value) in _PYTHON_TYPES[name] for name in names)
+    if isinstance(required, str):
+        return type(value) in _PYTHON_TYPES[required]
+    return any(type(value) in _PYTHON_TYPES[name] for name in required)
 
 
 #: Keywords that only describe, or that belong to another keyword.

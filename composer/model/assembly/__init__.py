@@ -15,9 +15,8 @@ from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.document.limits import LimitedDiagnostics, Stopped, TooManyErrors
-from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
-from composer.language.tree import Entry, LeftOut, Mapping
+from composer.language.tree import Entry, LeftOut, Mapping, count_values
 from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
@@ -120,6 +119,6 @@ def _assembled(
         resolver.folders,
         included,
         resolver.left_out,
-        resolver.values + measure(merged).values,
+        resolver.values + count_values(merged),
         source,
     )

@@ -12,11 +12,10 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand import expand, missing_names
-from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE, EMPTY_COLLECTION, MISSING_VARIABLE
 from composer.language.schema import check_schema
 from composer.language.schema.kinds import SYSTEM, with_intended_sections
-from composer.language.tree import Entry, LeftOut, Mapping, Tree, plain
+from composer.language.tree import Entry, LeftOut, Mapping, Tree, count_values, plain
 from composer.language.tree_values import entries, items, plain_text
 from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
 from composer.model.assembly.limits import IncludeLimits, exceeded
@@ -73,12 +72,12 @@ class IncludeResolver:
         Raises Stopped.
         """
         self.folders[file.source.path] = file.path.parent
-        self.values += measure(file.tree).values
+        self.values += count_values(file.tree)
         tree, misspelled = with_intended_sections(file.tree, SYSTEM)
         self.diagnostics += misspelled
         expanded, found, left_out = expand(tree, arguments)
         if self._stack:
-            self.limits.count("values", measure(expanded).values, self._stack[-1].span)
+            self.limits.count("values", count_values(expanded), self._stack[-1].span)
             found += _missing(tree, arguments, self._stack[-1].span)
         found += _without_emptied(check_schema(expanded, SYSTEM), tree)
         self.diagnostics += found

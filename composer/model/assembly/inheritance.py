@@ -11,10 +11,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile
 from composer.language.document import read_document
 from composer.language.document.limits import MAX_INCLUDE_DEPTH, Stopped
-from composer.language.expand.scope import measure
 from composer.language.rules import CYCLE
 from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
-from composer.language.tree import Mapping
+from composer.language.tree import Mapping, count_values
 from composer.language.tree_values import text
 from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, exceeded
 from composer.model.assembly.merging import merge_maps
@@ -117,7 +116,7 @@ def _base(
     file = read_node_type(path, diagnostics)
     if file is not None:
         limits.count("characters", len(file.source.text), name.span)
-        limits.count("values", measure(file.tree).values, name.span)
+        limits.count("values", count_values(file.tree), name.span)
     return file
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from composer.base.diagnostics import Diagnostic, error
 from composer.base.source import Located, Span
 from composer.language.expressions import Expression, ExpressionError, compile_expression
@@ -160,20 +158,13 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
 
     Their full names are the declared ones until the node has a name and a namespace.
     """
+    # A class may use its messages again, so they are copied.
+    isolation = Isolation.SHARE if node.get("class") is None else Isolation.COPY
     return tuple(
-        replace(
-            _port(kind, entry, qos, diagnostics),
-            isolation=_isolation(mapping(entry), node),
-        )
+        _port(kind, entry, qos, isolation, diagnostics)
         for kind in PortKind
         for entry in entries(node.get(kind.section))
     )
-
-
-def _isolation(port: Mapping, node: Mapping) -> Isolation:
-    """Return whether messages are copied: a class may use its messages again, so they are."""
-    usual = Isolation.SHARE if node.get("class") is None else Isolation.COPY
-    return value_or(choice(port.get("isolation"), Isolation), usual)
 
 
 def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ...]:
@@ -181,7 +172,13 @@ def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ..
     return tuple(_timer(entry, diagnostics) for entry in entries(node.get("timers")))
 
 
-def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnostic]) -> Port:
+def _port(
+    kind: PortKind,
+    entry: Entry,
+    qos: QosTable,
+    isolation: Isolation,
+    diagnostics: list[Diagnostic],
+) -> Port:
     span = entry.key.span
     tree = mapping(entry)
     ros_name = text(tree.get(kind.channel.value)) or key(entry)
@@ -205,6 +202,7 @@ def _port(kind: PortKind, entry: Entry, qos: QosTable, diagnostics: list[Diagnos
         reentrant=flag(tree.get("reentrant"), default=False),
         always_on=flag(tree.get("always_on"), default=False),
         external=flag(tree.get("external"), default=False),
+        isolation=value_or(choice(tree.get("isolation"), Isolation), isolation),
         required=_required(tree.get("required")),
         description=plain_text(tree.get("description")),
     )

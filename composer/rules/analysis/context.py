@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import field
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import field, replace
+from functools import wraps
+from itertools import islice
+from typing import Any, TypeAlias, TypeVar
 
+from composer.base.diagnostics import Diagnostic, Severity
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
+from composer.language.document.limits import MAX_FINDINGS
 from composer.language.expressions import Expression, FieldPath
+from composer.language.rules import TOO_LARGE
 from composer.model import Channel, ChannelKind, Port, System, channels
 from composer.model.scenario import Scenario
 from composer.project.node_types import NodeTypes
@@ -65,6 +70,29 @@ class Context:
         """Return the definition of a port's type; None if it is unknown or of another kind."""
         found = self.interfaces.find(port.interface.value)
         return found if isinstance(found, _DEFINITIONS[port.kind.channel]) else None
+
+
+Check: TypeAlias = Callable[[Context], Iterator[Diagnostic]]
+
+
+def limited(check: Check) -> Check:
+    """Limit the diagnostics of a check; only for one that reports no errors.
+
+    Beyond the limit, the check ends with an info that says so.
+    """
+
+    @wraps(check)
+    def limited_check(context: Context) -> Iterator[Diagnostic]:
+        diagnostics = check(context)
+        yield from islice(diagnostics, MAX_FINDINGS)
+        for item in islice(diagnostics, 1):
+            message = (
+                f"more than {MAX_FINDINGS:,} diagnostics are like this one; the others are left out"
+            )
+            yield item
+            yield Diagnostic(replace(TOO_LARGE, severity=Severity.INFO), message, item.primary)
+
+    return limited_check
 
 
 def is_unresolved(text: str) -> bool:
