@@ -13,7 +13,7 @@ from composer.rules.analysis.frames import (
     FrameTree,
     Gap,
     complete_trees,
-    cycles,
+    frame_cycles,
     frame_trees,
     gaps,
     nearest_parent,
@@ -29,7 +29,7 @@ def check_unknown_frame(context: Context) -> Iterator[Diagnostic]:
     """Check the frames that nodes look up, in YAML and in behaviors."""
     for tree in complete_trees(context):
         known = frozenset(tree.frames)
-        in_cycles = {item.child for cycle in cycles(tree) for item in cycle}
+        in_cycles = {item.child for cycle in frame_cycles(tree) for item in cycle}
         for lookup in tree.lookups:
             roots = [tree.root(frame.value) for frame in lookup.frames if frame.value in known]
             has_cycle = bool(in_cycles) and all(root in in_cycles for root in roots)
@@ -83,7 +83,7 @@ def _broadcasters(first: Broadcast, second: Broadcast) -> str:
 def check_frame_cycle(context: Context) -> Iterator[Diagnostic]:
     """Report each cycle once."""
     for tree in context.once(frame_trees):
-        for cycle in cycles(tree):
+        for cycle in frame_cycles(tree):
             first, *others = _from_the_system(cycle)
             path = " -> ".join((*(item.child for item in (first, *others)), first.child))
             message = f"frames are parents of each other in a cycle: {path}"
@@ -140,7 +140,7 @@ _MAX_SEARCHED = 20  # roots that may be misspelled
 def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:
     """Report all trees together, where one of them is probably misspelled, else at the second."""
     for tree in complete_trees(context):
-        if any(cycles(tree)) or len(tree.by_child) < len(tree.broadcasts):
+        if frame_cycles(tree) or len(tree.by_child) < len(tree.broadcasts):
             continue
         reported = {root for gap in gaps(tree) for _, root in gap.ends}
         roots = tree.roots()

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, info, suggestion, warning
+from composer.base.graphs import cycles
 from composer.base.source import Located
 from composer.language.rules import CYCLE, UNUSED_DECLARATION
 from composer.model import ChannelKind, NamedQos, Port, PortKind, PortOfNode
@@ -81,18 +82,12 @@ def check_unused_qos_profile(context: Context) -> Iterator[Diagnostic]:
 def check_qos_profile_cycle(context: Context) -> Iterator[Diagnostic]:
     """Follow the profiles that each profile extends; report every cycle once."""
     profiles = {profile.name.value: profile for profile in context.system.qos_profiles}
-    done: set[str] = set()
-    for name in profiles:
-        path: dict[str, NamedQos] = {}
-        step: str | None = name
-        while step is not None and step in profiles and step not in done and step not in path:
-            path[step] = profiles[step]
-            extends = path[step].extends
-            step = extends.value if extends is not None else None
-        done.update(path)
-        if step is not None and step in path:
-            names = list(path)
-            yield _profile_cycle([path[item] for item in names[names.index(step) :]])
+    graph: dict[str, list[str]] = {name: [] for name in profiles}
+    for name, profile in profiles.items():
+        if profile.extends is not None and profile.extends.value in profiles:
+            graph[name].append(profile.extends.value)
+    for names in cycles(graph):
+        yield _profile_cycle([profiles[name] for name in names])
 
 
 def _profile_cycle(cycle: list[NamedQos]) -> Diagnostic:

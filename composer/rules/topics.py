@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, error, info, warning
+from composer.base.graphs import cycles
 from composer.base.source import Span
 from composer.model import (
     Channel,
@@ -32,13 +33,12 @@ _Steps = dict[str, dict[str, PortOfNode]]
 
 
 def check_topic_loop(context: Context) -> Iterator[Diagnostic]:
-    """Follow messages from topic to topic; report every cycle once."""
+    """Follow messages from topic to topic; report a cycle of each group of topics."""
     steps = _steps(context)
-    done: set[str] = set()
-    for start in steps:
-        cycle = _first_cycle(steps, start, done)
-        if cycle:
-            yield _topic_loop(cycle)
+    graph = {topic: [name for name in targets if name in steps] for topic, targets in steps.items()}
+    for names in cycles(graph):
+        pairs = zip(names, (*names[1:], names[0]), strict=True)
+        yield _topic_loop(names, [steps[topic][target] for topic, target in pairs])
 
 
 def _steps(context: Context) -> _Steps:
@@ -61,35 +61,9 @@ def _republished(node: Node, port: Port) -> Iterator[str]:
             yield target.full_name
 
 
-def _first_cycle(steps: _Steps, start: str, done: set[str]) -> list[tuple[str, PortOfNode]]:
-    """Return the first cycle that can be reached from ``start`` through topics not ``done``.
-
-    Each item is a topic and the subscription that republishes to it.
-    """
-    path: list[str] = []
-    steps_taken: list[tuple[str, PortOfNode]] = []
-    rest = {start: iter(steps.get(start, {}).items())}
-    if start not in done:
-        path.append(start)
-    while path:
-        target, endpoint = next(rest[path[-1]], (None, None))
-        if target is None or endpoint is None:
-            done.add(path.pop())
-            steps_taken = steps_taken[: max(len(path) - 1, 0)]
-        elif target in path:
-            done.update(path)
-            return [*steps_taken[path.index(target) :], (target, endpoint)]
-        elif target not in done:
-            steps_taken.append((target, endpoint))
-            path.append(target)
-            rest[target] = iter(steps.get(target, {}).items())
-    return []
-
-
-def _topic_loop(cycle: list[tuple[str, PortOfNode]]) -> Diagnostic:
-    names = [topic for topic, _ in cycle]
-    path = " -> ".join((names[-1], *names))
-    first, *others = [(endpoint, diagnostic_location(endpoint)[0]) for _, endpoint in cycle]
+def _topic_loop(names: tuple[str, ...], endpoints: list[PortOfNode]) -> Diagnostic:
+    path = " -> ".join((*names, names[0]))
+    first, *others = [(endpoint, diagnostic_location(endpoint)[0]) for endpoint in endpoints]
     return Diagnostic(
         TOPIC_LOOP,
         f"messages circulate forever: {path}",

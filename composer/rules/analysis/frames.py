@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from composer.base.diagnostics import Label
 from composer.base.fast_dataclass import dataclass
+from composer.base.graphs import cycles
 from composer.base.source import Located, Span
 from composer.base.spelling import vocabulary
 from composer.model import (
@@ -313,16 +314,10 @@ def nearest_parent(tree: FrameTree, name: str, is_possible: Callable[[str], bool
     return next((frame for frame in close if frame != name and is_possible(frame)), None)
 
 
-def cycles(tree: FrameTree) -> Iterator[tuple[Broadcast, ...]]:
-    """Yield each cycle of frames once: from a child to its parent, and so on."""
-    done: set[str] = set()
-    for start in tree.by_child:
-        path: dict[str, None] = {}
-        frame = start
-        while frame in tree.by_child and frame not in done and frame not in path:
-            path[frame] = None
-            frame = tree.by_child[frame].parent
-        if frame in path:
-            names = list(path)
-            yield tuple(tree.by_child[name] for name in names[names.index(frame) :])
-        done.update(path)
+def frame_cycles(tree: FrameTree) -> tuple[tuple[Broadcast, ...], ...]:
+    """Return each cycle of frames once: from a child to its parent, and so on."""
+    graph = {
+        child: (item.parent,) if item.parent in tree.by_child else ()
+        for child, item in tree.by_child.items()
+    }
+    return tuple(tuple(tree.by_child[name] for name in names) for names in cycles(graph))
