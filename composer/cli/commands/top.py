@@ -30,12 +30,10 @@ EPILOG = examples(
     "compose top --json            print a line of JSON every second",
 )
 _SORT_KEYS = "busy, calls, mean, p99, max, late, dropped or node"
-#: Managers report about every second; accept a report that is this much early.
-_PERIOD_S, _EARLY_S = 1.0, 0.5
-#: A system without a report for this long, beyond the period, may have ended.
-_NO_REPORT_S = 5.0
-#: The other processes of a system report in the same period, at times of their own.
-_OTHERS_WITHIN_S = 1.5
+#: A system without a report for this long may have ended.
+_NO_REPORT_S = 6.0
+#: The other processes of a system also report every second, at times of their own.
+_OTHERS_WITHIN_S = 2.5
 
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 _HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
@@ -71,7 +69,8 @@ def top(
 
         systems = Systems(session, deadline, callbacks=True)
         found = systems.only() if name is None else systems.find(name)
-        follower = _Follower(session, systems, systems.report(found))
+        others_within_s = _NO_REPORT_S if once else _OTHERS_WITHIN_S
+        follower = _Follower(session, systems, systems.report(found), others_within_s)
         key = SortKey(sort)
         with _Screen(full=not (once or json)) as screen:
             while follower.wait(screen.quit_requested):
@@ -85,44 +84,43 @@ def top(
 class _Follower:
     """Follows the reports of a system."""
 
-    def __init__(self, session: Session, systems: Systems, report: SystemReport) -> None:
+    def __init__(
+        self, session: Session, systems: Systems, report: SystemReport, others_within_s: float
+    ) -> None:
         self._session = session
         self._systems = systems
         from composer.cli.support.callback_tables import SystemMeter
 
+        self._others_within_s = others_within_s
         self._now = systems.whole(report)
         self._meter = SystemMeter()
         self._rates = self._meter.read(self._now)
-        self._silent: set[str] = set()  # processes that did not report during the last period
+        self._silent: set[str] = set()  # processes without new rates after the last wait
 
     def wait(self, quit_requested: Callable[[], bool]) -> bool:
-        """Wait for the next report; return False if ``quit_requested`` is true first.
+        """Wait for new rates; return False if ``quit_requested`` is true first.
 
         Raises CommandError if the system stops reporting.
         """
         from composer.client.session import Deadline
 
-        due_s = self._now.callbacks_at_s + _PERIOD_S - _EARLY_S
-        deadline = Deadline(_PERIOD_S + _NO_REPORT_S)
-        others = Deadline(_PERIOD_S + _OTHERS_WITHIN_S)
+        before_s = self._meter.rated_s(self._now)
+        deadline, others = Deadline(_NO_REPORT_S), Deadline(self._others_within_s)
         while not quit_requested():
-            report = self._systems.newer(self._now.name, due_s)
+            report = self._systems.current()[self._now.name]
             if report is not None:
-                now = self._systems.whole(report)
-                silent = {
-                    process
-                    for process in now.processes
-                    if now.callbacks_at(process) <= self._now.callbacks_at(process)
-                }
-                if silent <= self._silent or others.passed:
-                    self._now, self._silent = now, silent
-                    self._rates = self._meter.read(now)
-                    return True
-            if deadline.passed:
+                self._now = self._systems.whole(report)
+                self._rates = self._meter.read(self._now)
+            rated_s = self._meter.rated_s(self._now)
+            silent = {name for name, at_s in rated_s.items() if at_s in (None, before_s.get(name))}
+            if "" not in silent and (silent <= self._silent or others.passed):
+                self._silent = silent
+                return True
+            if "" in silent and deadline.passed:
                 raise CommandError(
                     f"{self._now.name} stopped publishing its status, it may have ended"
                 )
-            self._session.spin_once(deadline)
+            self._session.spin_once(deadline if "" in silent else others)
         return False
 
     def table(self, key: SortKey, max_lines: int | None) -> str:

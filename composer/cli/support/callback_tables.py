@@ -60,9 +60,17 @@ class SystemMeter:
             callbacks[process_of.get(item.node, "")].append(item)
         return [
             rates
-            for process, items in callbacks.items()
-            for rates in self._meters[process].read(items, report.callbacks_at(process))
+            for process in ("", *report.processes)
+            if (at_s := report.callbacks_at(process))
+            for rates in self._meters[process].read(callbacks[process], at_s)
         ]
+
+    def rated_s(self, report: SystemReport) -> dict[str, float | None]:
+        """Return for each process when it reported what its rates are from; None without rates.
+
+        Reports that are too close to the one before, or are the first one, have no rates.
+        """
+        return {process: self._meters[process].rated_s for process in ("", *report.processes)}
 
 
 def in_order(callbacks: Iterable[CallbackRates], key: SortKey) -> list[CallbackRates]:

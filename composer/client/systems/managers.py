@@ -178,12 +178,6 @@ class Systems:
         """Destroy all subscriptions."""
         self.forget(tuple(self._subscriptions))
 
-    def newer(self, name: str, than_s: float) -> SystemReport | None:
-        """Return the report of a system if its callbacks are newer than ``than_s``, else None."""
-        if self._callbacks[name].at_s <= than_s:
-            return None
-        return self._report(name)
-
     def command(self, name: str, command: str) -> tuple[bool, str]:
         """Call a service of a manager; return whether it succeeded, and its message.
 

@@ -179,7 +179,6 @@ class CallbackRates:
 class _Reading:
     """The last rates of a callback, and what they follow from."""
 
-    at_s: float
     calls: CountedRate
     rates: CallbackRates
 
@@ -189,30 +188,34 @@ class CallbackMeter:
 
     def __init__(self) -> None:
         self._readings: dict[tuple[str, str, str], _Reading] = {}
+        self._at_s: float | None = None  # of the last report that was read
+        #: When the last report was read that has rates: not the first one.
+        self.rated_s: float | None = None
 
     def read(self, callbacks: Iterable[CallbackFigures], at_s: float) -> list[CallbackRates]:
         """Return the rates of callbacks that were reported ``at_s``."""
-        before = self._readings
-        self._readings = {
-            key: _next(before.get(key), item, at_s)
-            for item in callbacks
-            for key in ((item.node, item.kind, item.name),)
-        }
+        elapsed_s = -1.0 if self._at_s is None else at_s - self._at_s
+        if not 0.0 <= elapsed_s < _APART_S:
+            before = self._readings if elapsed_s > 0.0 else {}  # simulated time may begin again
+            self._readings = {
+                key: _next(before.get(key), item, at_s, elapsed_s)
+                for item in callbacks
+                for key in ((item.node, item.kind, item.name),)
+            }
+            self._at_s = at_s
+            self.rated_s = at_s if elapsed_s > 0.0 else None
         return [reading.rates for reading in self._readings.values()]
 
 
-def _next(before: _Reading | None, now: CallbackFigures, at_s: float) -> _Reading:
-    last = None if before is None else before.rates.figures
-    if before is None or last is None or now.count < last.count or at_s < before.at_s:
+def _next(before: _Reading | None, now: CallbackFigures, at_s: float, elapsed_s: float) -> _Reading:
+    if before is None or now.count < before.rates.figures.count:
         calls = CountedRate()  # the first report, or a node that was created again
         calls.read(now.count, at_s)
-        return _Reading(at_s, calls, CallbackRates(now))
-    elapsed_s = at_s - before.at_s
-    if elapsed_s < _APART_S:
-        return before
+        return _Reading(calls, CallbackRates(now))
+    last = before.rates.figures
     before.calls.read(now.count, at_s)
     calls_hz = before.calls.current_hz(at_s)
     if calls_hz is None:
         calls_hz = (now.count - last.count) / elapsed_s
     busy = max(0.0, now.total_ms - last.total_ms) / (_MS * elapsed_s)
-    return _Reading(at_s, before.calls, CallbackRates(now, calls_hz, busy))
+    return _Reading(before.calls, CallbackRates(now, calls_hz, busy))

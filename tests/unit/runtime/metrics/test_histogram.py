@@ -196,24 +196,41 @@ def test_the_summary_shows_the_slowest_callbacks() -> None:
     assert lines[2] == "1 more callbacks took less time"
 
 
-def test_rates_of_other_processes_are_those_between_their_own_reports() -> None:
-    def whole(at_s: float, others_at_s: float, calls: int) -> SystemReport:
-        other = replace(
-            report(others_at_s, CallbackFigures("/b", "timer", "tick", calls)),
-            chains=(ChainFigures("way", 10.0, calls), ChainFigures("unknown", 1.0, 1)),
-        )
-        own = replace(
-            report(at_s, CallbackFigures("/a", "timer", "tick", calls)),
-            nodes=(node("/a", ""), node("/b", "acting")),
-            chains=(ChainFigures("way", 10.0),),
-        )
-        return with_processes(own, {"acting": other})
+def whole(at_s: float, others_at_s: float, calls: int) -> SystemReport:
+    """Return a report with the callbacks of another process, which has reported at its own time."""
+    other = replace(
+        report(others_at_s, CallbackFigures("/b", "timer", "tick", calls)),
+        chains=(ChainFigures("way", 10.0, calls), ChainFigures("unknown", 1.0, 1)),
+    )
+    own = replace(
+        report(at_s, CallbackFigures("/a", "timer", "tick", calls)),
+        nodes=(node("/a", ""), node("/b", "acting")),
+        chains=(ChainFigures("way", 10.0),),
+    )
+    return with_processes(own, {"acting": other} if others_at_s else {})
 
+
+def test_rates_of_other_processes_are_those_between_their_own_reports() -> None:
     before, now = whole(1.0, 0.5, 10), whole(2.0, 2.5, 30)
     assert now.processes == {"acting": "/robot/acting"}
     found = {item.figures.node: item.calls_hz for item in rates(before, now)}
     assert found == {"/a": 20.0, "/b": 10.0}
     assert [(chain.chain, chain.count) for chain in now.chains] == [("way", 30)]
+
+
+def test_a_process_has_rates_once_two_of_its_reports_are_apart() -> None:
+    meter = SystemMeter()
+    for at_s, others_at_s, rated_s in (
+        (1.0, 0.0, None),  # it has not reported yet
+        (2.0, 2.4, None),
+        (3.0, 2.5, None),  # a report about a new subscription
+        (3.5, 3.4, 3.4),
+        (4.0, 3.4, 3.4),
+    ):
+        now = whole(at_s, others_at_s, round(10 * at_s))
+        found = {item.figures.node: item.calls_hz for item in meter.read(now)}
+        assert meter.rated_s(now)["acting"] == rated_s
+        assert (found.get("/b") is None) == (rated_s is None)
 
 
 def node(name: str, process: str) -> NodeReport:
