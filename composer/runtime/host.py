@@ -44,7 +44,8 @@ from composer.runtime.executors.placement import (
     switch_threads_sooner,
 )
 from composer.runtime.host_options import HostOptions, TimeLimits
-from composer.runtime.manager.node import ManagerCallbacks, ManagerNode
+from composer.runtime.manager.node import ManagerNode
+from composer.runtime.manager.publishing import ManagerContext
 from composer.runtime.middleware.dds_profiles import use_large_system_profile
 from composer.runtime.middleware.environment import (
     ROS_ARGUMENTS,
@@ -206,7 +207,9 @@ class Host:
     def _join(self, namespace: str) -> ManagerNode:
         """Join the ROS graph, as the first node of a process does."""
         _start_ros()
-        callbacks = ManagerCallbacks(
+        context = ManagerContext(
+            status=self._status,
+            report_key=self._report_key,
             on_command=self._on_command,
             on_older_instance=partial(self._on_older_instance, namespace),
             update_status=self._update_status,
@@ -218,15 +221,8 @@ class Host:
             save_recording=self._save_recording,
             write_log=self._reporter.log,
         )
-        use_sim_time = self._system.use_sim_time
         try:
-            return ManagerNode(
-                namespace,
-                self._status,
-                callbacks,
-                use_sim_time=use_sim_time,
-                report_key=self._report_key,
-            )
+            return ManagerNode(namespace, context, use_sim_time=self._system.use_sim_time)
         except rclpy_implementation.RCLError as error:
             raise start_refused(error) from error
 

@@ -8,7 +8,6 @@ the loop of the node.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
@@ -20,7 +19,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model.lifecycle import FINALIZED, TRANSITIONS
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.members.lives import REPORTS_WITHIN_S
+from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.managed_node import (
@@ -101,26 +100,6 @@ _TRANSITIONS = (*DONE_IN, CREATE)
 _CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
 
-@dataclass(frozen=True, slots=True)
-class MemberCallbacks:
-    """What the service calls, on its loop.
-
-    ``nodes()`` returns the nodes by their full names. ``recreate(node)``, called on the loop of the
-    node, replaces it by a new one if it is finalized, and returns why it cannot be created, or
-    None. ``report_number()`` returns the number of the last report of the states.
-    ``publish_states()`` is called once nodes are shut down: the coordinating process waits for
-    their last counters. ``expect_end()`` is called if the process ends after the steps of a
-    request. ``report_key`` answers processes that ask for it, unless it is empty.
-    """
-
-    nodes: Nodes
-    recreate: Callable[[ManagedNode], str | None]
-    report_number: Callable[[], int]
-    publish_states: Callable[[], None]
-    expect_end: Callable[[], None]
-    report_key: str
-
-
 @dataclass(slots=True)
 class _RunningStep:
     """A step that runs, or has ended with ``result``."""
@@ -135,52 +114,47 @@ class MemberService:
     def __init__(
         self,
         loop: Loop,
-        callbacks: MemberCallbacks,
-        participant: str,
+        context: ManagerContext,
+        reports: ReportPublisher,
         log: Callable[[str], None],
     ) -> None:
-        """``participant`` is that of the process, as it reports it."""
         self._loop = loop
-        self._callbacks = callbacks
-        self._participant = participant
+        self._context = context
+        self._reports = reports
         self._log = log
         self._received = ReceivedSteps[_RunningStep]()
-        self._reports = ReportTimes()
         self._repeats = RepeatLimit(loop.clock)
-
-    def on_report(self, number: int) -> None:
-        """Receive that a report is the current one now."""
-        self._reports.note(number, self._loop.clock.monotonic())
 
     def on_request(
         self, request: ChangeStates | AskReportKey, reply: Callable[[Any], None]
     ) -> None:
         """Answer a request, now or later."""
         if isinstance(request, AskReportKey):
-            if self._callbacks.report_key:
-                reply(ReportKey(self._callbacks.report_key))
+            if not self._context.status.without_nodes.is_child:  # else, it has given the key
+                reply(ReportKey(self._context.report_key))
             return
-        if request.participant and request.participant != self._participant:
+        if request.participant and request.participant != self._reports.participant:
             return  # for another process of the same name
-        if self._reports.is_outdated(request.seen_report, self._loop.clock.monotonic()):
+        if self._reports.is_outdated(request.seen_report):
             self._log_late(request.steps)
         else:
             if request.are_last:
-                self._callbacks.expect_end()
+                self._reports.includes_timings = True
+                self._context.expect_end()
             self._loop.run_task(self._change_states(request, reply))
 
     def _log_late(self, steps: Sequence[Step]) -> None:
         admission = self._repeats.admit("late")
         if admission is None:
             return
-        nodes = self._callbacks.nodes()
+        nodes = self._context.nodes()
         known = [step for step in steps if step.transition in _TRANSITIONS and step.node in nodes]
         listed = ", ".join(map(str, known[:_MAX_LISTED]))
         self._log(f"ignored a request that has arrived too late: {listed}{admission.suffix}")
 
     async def _change_states(self, request: ChangeStates, reply: Callable[[Any], None]) -> None:
         """Run all steps of a request, at the same time unless they wait for each other."""
-        nodes = self._callbacks.nodes()
+        nodes = self._context.nodes()
         running = [self._start(request.sender, step, nodes) for step in request.steps]
         results: list[StepResult] = []
         try:
@@ -189,7 +163,7 @@ class MemberService:
         finally:
             reply(StepResults(tuple(results)))
         if any(step.transition == _SHUTDOWN for step in request.steps):
-            self._callbacks.publish_states()
+            self._reports.publish()  # the coordinating process waits for their last counters
 
     def _start(
         self, sender: str, step: Step, nodes: Mapping[str, ManagedNode]
@@ -228,10 +202,10 @@ class MemberService:
         The coordinating process configures one only to restart it, or to bring the system up.
         """
         if transition in (_CONFIGURE, CREATE) and node.state == FINALIZED:
-            problem = self._callbacks.recreate(node)
+            problem = self._context.recreate(node)
             if problem is not None:
                 return TransitionOutcome(transition, FINALIZED, success=False, reason=problem)
-            node = self._callbacks.nodes()[node.full_name]
+            node = self._context.nodes()[node.full_name]
         if node.state in DONE_IN.get(transition, ()):  # by a request that was given up, perhaps
             return TransitionOutcome(transition, node.state, success=True)
         if transition == CREATE:
@@ -244,16 +218,12 @@ class MemberService:
             return StepResult(success=False, reason=step)
         outcome = await step.change
         if step.result is None:
-            number = self._callbacks.report_number()
             reason = "" if outcome.success else outcome.reason
-            step.result = StepResult(outcome.success, reason, number)
+            step.result = StepResult(outcome.success, reason, self._reports.number)
         return step.result
 
 
 T = TypeVar("T")
-
-#: The coordinating process gives up a process whose reports are missing, after this time at most.
-_OUTDATED_S = REPORTS_WITHIN_S + 1.0
 
 
 class ReceivedSteps(Generic[T]):
@@ -282,28 +252,3 @@ class ReceivedSteps(Generic[T]):
     def of(self, nodes: Iterable[str]) -> list[T]:
         """Return what runs, or ran, the last steps of some nodes."""
         return [self._last[node][2] for node in nodes if node in self._last]
-
-
-class ReportTimes:
-    """When the last reports of this process were published: no step is run too late.
-
-    DDS repeats what was lost for longer than the coordinating process waits: after the network has
-    failed for a while, steps arrive that it has given up. The clocks of two computers may differ,
-    so the age of a request is that of the last report that its sender had seen.
-    """
-
-    def __init__(self) -> None:
-        self._times: deque[tuple[int, float]] = deque()
-
-    def note(self, number: int, now_s: float) -> None:
-        """Note that a report is the current one now: it is published, or none has to follow yet."""
-        if self._times and self._times[-1][0] == number:
-            self._times.pop()
-        self._times.append((number, now_s))
-        while self._times[0][1] < now_s - _OUTDATED_S and len(self._times) > 1:
-            self._times.popleft()
-
-    def is_outdated(self, number: int, now_s: float) -> bool:
-        """Return whether the sender of a request had last seen a report that is too old."""
-        limit_s = now_s - _OUTDATED_S
-        return not any(known == number and at_s >= limit_s for known, at_s in self._times)

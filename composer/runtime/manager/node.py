@@ -10,7 +10,7 @@ Its topics are described in :mod:`.publishing`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -19,25 +19,22 @@ from rclpy.parameter import Parameter
 from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
-from composer.base.fast_dataclass import dataclass
-from composer.runtime.callbacks.log import Log, Write
+from composer.runtime.callbacks.log import Log
 from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.manager.graph_view import GraphObserver, ManagerQueries
-from composer.runtime.manager.member_service import MemberCallbacks, MemberService, answer_calls
+from composer.runtime.manager.member_service import MemberService, answer_calls
 from composer.runtime.manager.other_instances import OtherInstances
-from composer.runtime.manager.publishing import ReportPublisher, ReportSources
+from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.node.local_node import LocalNode
-from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time.node_time import NodeTime
 from composer.runtime.node_time.sim_time import SimTimeSource, publish_clock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.codec import ProtocolError
-from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.protocol.requests import (
     ALL_OR_NOTHING,
     IS_ACTIVE,
@@ -59,7 +56,6 @@ from composer.runtime.ros.manager_interface import (
 )
 from composer.runtime.ros_graph.changes import GraphChanges
 from composer.runtime.supervision.main_queue import Command
-from composer.runtime.supervision.status import Status
 from composer.runtime.transforms.listener import TransformListeners
 
 COMMANDS = (
@@ -75,32 +71,6 @@ _ENDS_WITHIN_S = 0.2
 _RESPONSES_ARRIVE_WITHIN_S = 0.15
 
 
-@dataclass(frozen=True, slots=True)
-class ManagerCallbacks:
-    """What a manager node calls, on its loop.
-
-    ``on_command(command)`` receives the commands; ``on_older_instance(instance)`` is called while
-    the system starts if another process runs it already; ``update_status()`` updates rates and
-    states; ``callbacks()`` and ``chains()`` return timings; ``nodes()`` returns the nodes by their
-    full names; ``recreate(node)``, called on the loop of the node, replaces it by a new one if it
-    is finalized, and returns why it cannot be created, or None; ``expect_end()`` is called before
-    the last transitions that another process requests; ``save_recording(done)`` writes the last
-    seconds, if the system has a flight recorder; ``write_log`` receives the lines of the manager's
-    log.
-    """
-
-    on_command: Callable[[Command], None]
-    on_older_instance: Callable[[Instance], None]
-    update_status: Callable[[], None]
-    callbacks: Callable[[], tuple[CallbackFigures, ...]]
-    chains: Callable[[], tuple[ChainFigures, ...]]
-    nodes: Callable[[], Mapping[str, ManagedNode]]
-    recreate: Callable[[ManagedNode], str | None]
-    expect_end: Callable[[], None]
-    save_recording: Callable[[Callable[[bool, str], None]], None]
-    write_log: Write
-
-
 class ManagerNode:
     """The manager node, on a loop of its own, which no other node can block.
 
@@ -108,22 +78,12 @@ class ManagerNode:
     """
 
     def __init__(
-        self,
-        namespace: str,
-        status: Status,
-        host: ManagerCallbacks,
-        *,
-        use_sim_time: bool = False,
-        report_key: str = "",
+        self, namespace: str, context: ManagerContext, *, use_sim_time: bool = False
     ) -> None:
-        """Join the ROS graph. With ``use_sim_time``, stamps have the time of /clock.
-
-        With ``report_key``, another process of the system moves all nodes by this manager, and
-        reports are signed with it.
-        """
-        self._status = status
-        self._host = host
-        self._loop = Loop(NAME, exception_log(status.clock, host.write_log), clock=status.clock)
+        """Join the ROS graph. With ``use_sim_time``, stamps have the time of /clock."""
+        status = context.status
+        self._context = context
+        self._loop = Loop(NAME, exception_log(status.clock, context.write_log), clock=status.clock)
         self._member: MemberService | None = None
         self._node = Node(
             NAME,
@@ -133,7 +93,7 @@ class ManagerNode:
             start_parameter_services=False,  # see parameter_services.py
         )
         limit_type_descriptions(self._node)
-        self._log = Log(self._node, host.write_log)
+        self._log = Log(self._node, context.write_log)
         self._own_parameters = ParameterServices(self._node, status.clock, self._log.warn)
         self._own_parameters.provide()
         LoggerServices(self._node, status.clock, self._log.warn)
@@ -156,30 +116,15 @@ class ManagerNode:
             changes,
             self._loop,
             self._instance,
-            on_older=host.on_older_instance,
+            on_older=context.on_older_instance,
             on_permanent=self._warn_of_instance,
         )
         own_participant = self._instances.participant
-        sources = ReportSources(
-            *(status, host.callbacks, host.chains),
-            *(self._on_report, report_key, own_participant.hex()),
-        )
         self._reports = ReportPublisher(
-            self._node, self._loop, self.process_context.events, sources
+            self.process_context, self._loop, context, own_participant.hex()
         )
-        if report_key:
-            is_child = status.without_nodes.is_child
-            callbacks = MemberCallbacks(
-                host.nodes,
-                host.recreate,
-                lambda: self._reports.number,
-                self._reports.publish,
-                self._expect_end,
-                "" if is_child else report_key,  # the coordinating process has given it
-            )
-            self._member = MemberService(
-                self._loop, callbacks, own_participant.hex(), self._log.info
-            )
+        if context.report_key:
+            self._member = MemberService(self._loop, context, self._reports, self._log.info)
         self._graph = GraphObserver(changes, own_participant)
         queries = ManagerQueries(
             self._loop,
@@ -205,7 +150,7 @@ class ManagerNode:
         """
         if self._query_socket is not None:
             self._query_socket.close(_ENDS_WITHIN_S)
-        self._status.on_change(lambda: None)
+        self._context.status.on_change(lambda: None)
         self._loop.call_soon(self._reports.publish)
         if linger:
             self._loop.clock.sleep(_RESPONSES_ARRIVE_WITHIN_S)
@@ -220,7 +165,7 @@ class ManagerNode:
         own = (self._loop, self._own_parameters)
         return {self._node.get_fully_qualified_name(): own} | {
             name: (node.loop, node.parameter_services)
-            for name, node in self._host.nodes().items()
+            for name, node in self._context.nodes().items()
             if isinstance(node, LocalNode)
         }
 
@@ -233,7 +178,7 @@ class ManagerNode:
             self._loop.call_soon(lambda: reply(Trigger.Response(success=success, message=message)))
 
         command, all_or_nothing, _ = name.partition(ALL_OR_NOTHING)
-        self._host.on_command(Command(command, answer, all_or_nothing=bool(all_or_nothing)))
+        self._context.on_command(Command(command, answer, all_or_nothing=bool(all_or_nothing)))
 
     def _on_request(self, message: Any, reply: Reply) -> None:
         """Answer a request, or send it to what answers it."""
@@ -246,14 +191,14 @@ class ManagerNode:
         if isinstance(request, Restart):
             self._restart(request.nodes, reply)
         elif isinstance(request, SaveRecording):
-            self._host.save_recording(partial(self._answer, reply))
+            self._context.save_recording(partial(self._answer, reply))
         elif isinstance(request, CallNodes):
             self._loop.run_task(self._call_nodes(request, reply))
         elif self._member is not None:
             self._member.on_request(request, lambda answer: reply(answer_message(answer)))
 
     async def _call_nodes(self, request: CallNodes, reply: Reply) -> None:
-        reply(answer_message(await answer_calls(request, self._host.nodes())))
+        reply(answer_message(await answer_calls(request, self._context.nodes())))
 
     def _answer(self, reply: Reply, success: bool, message: str) -> None:
         """Answer a request, from any thread."""
@@ -261,37 +206,29 @@ class ManagerNode:
 
     def _restart(self, nodes: tuple[str, ...], reply: Reply) -> None:
         answer = partial(self._answer, reply)
-        known = self._host.nodes()
+        known = self._context.nodes()
         unknown = [name for name in nodes if name not in known]
         if unknown or not nodes:
             expected = "expected the full names of nodes"
             answer(False, f"there is no node '{unknown[0]:.256}'" if unknown else expected)
         else:
-            self._host.on_command(Command(_RESTART, answer, nodes))
+            self._context.on_command(Command(_RESTART, answer, nodes))
 
     def _on_is_active(self, _: Trigger.Request, reply: Reply) -> None:
-        status = self._status.snapshot()
+        status = self._context.status.snapshot()
         reply(Trigger.Response(success=status.is_active, message=status.message))
 
     def _tick(self) -> None:
-        self._host.update_status()
+        self._context.update_status()
         self._instances.check()
         self._graph.note_participants()
         self._reports.tick()
-
-    def _expect_end(self) -> None:
-        self._reports.includes_timings = True
-        self._host.expect_end()
-
-    def _on_report(self, number: int) -> None:
-        if self._member is not None:
-            self._member.on_report(number)
 
     def _on_query_error(self, error: Exception) -> None:
         self._node.get_logger().error(f"cannot answer a query of a command: {error!r}")
 
     def _instance(self) -> Instance:
-        status = self._status.without_nodes
+        status = self._context.status.without_nodes
         return Instance(status.host, status.pid, self._reports.uptime_s)
 
     def _warn_of_instance(self, other: Instance) -> None:

@@ -11,6 +11,7 @@ for tools of ROS. What commands and other processes need is in the reports of
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
@@ -19,15 +20,17 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.event_handler import QoSPublisherEventType, UnsupportedEventTypeError
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from std_msgs.msg import String
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.executors.event_counts import EventCounts
+from composer.runtime.callbacks.log import Write
 from composer.runtime.executors.loop import Loop
+from composer.runtime.members.lives import REPORTS_WITHIN_S
+from composer.runtime.node.managed_node import ManagedNode
+from composer.runtime.node.options import ProcessContext
 from composer.runtime.protocol.codec import encode
 from composer.runtime.protocol.reports import (
     CallbackFigures,
@@ -37,8 +40,9 @@ from composer.runtime.protocol.reports import (
     TimingReport,
     signed,
 )
-from composer.runtime.protocol.requests import CALLBACKS_TOPIC, STATE_TOPIC
+from composer.runtime.protocol.requests import CALLBACKS_TOPIC, STATE_TOPIC, Instance
 from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS
+from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 
 #: Most values are as in the message before, and making them again takes most of the time.
@@ -167,32 +171,81 @@ _LONGEST_BATCH_S = 0.5
 _MAX_SHARE = 0.02
 
 
-@dataclass(frozen=True, slots=True)
-class ReportSources:
-    """Where reports come from: ``callbacks()`` and ``chains()`` return timings.
+#: The coordinating process gives up a process whose reports are missing, after this time at most.
+_OUTDATED_S = REPORTS_WITHIN_S + 1.0
 
-    ``on_report(number)`` is called when a report is the current one. With ``key``, reports are
-    signed, and name the ``participant`` of the process.
+
+class ReportTimes:
+    """When the last reports of this process were published: no step is run too late.
+
+    DDS repeats what was lost for longer than the coordinating process waits: after the network has
+    failed for a while, steps arrive that it has given up. The clocks of two computers may differ,
+    so the age of a request is that of the last report that its sender had seen.
+    """
+
+    def __init__(self) -> None:
+        self._times: deque[tuple[int, float]] = deque()
+
+    def note(self, number: int, now_s: float) -> None:
+        """Note that a report is the current one now: it is published, or none has to follow yet."""
+        if self._times and self._times[-1][0] == number:
+            self._times.pop()
+        self._times.append((number, now_s))
+        while self._times[0][1] < now_s - _OUTDATED_S and len(self._times) > 1:
+            self._times.popleft()
+
+    def is_outdated(self, number: int, now_s: float) -> bool:
+        """Return whether the sender of a request had last seen a report that is too old."""
+        limit_s = now_s - _OUTDATED_S
+        return not any(known == number and at_s >= limit_s for known, at_s in self._times)
+
+
+@dataclass(frozen=True, slots=True)
+class ManagerContext:
+    """What a manager node has of its process: the status of the system, and what it calls.
+
+    With ``report_key``, another process of the system moves all nodes by this manager, and reports
+    are signed with the key. The functions are called on the loop of the manager.
+    ``on_command(command)`` receives the commands; ``on_older_instance(instance)`` is called while
+    the system starts if another process runs it already; ``update_status()`` updates rates and
+    states; ``callbacks()`` and ``chains()`` return timings; ``nodes()`` returns the nodes by their
+    full names; ``recreate(node)``, called on the loop of the node, replaces it by a new one if it
+    is finalized, and returns why it cannot be created, or None; ``expect_end()`` is called before
+    the last transitions that another process requests; ``save_recording(done)`` writes the last
+    seconds, if the system has a flight recorder; ``write_log`` receives the lines of the manager's
+    log.
     """
 
     status: Status
+    report_key: str
+    on_command: Callable[[Command], None]
+    on_older_instance: Callable[[Instance], None]
+    update_status: Callable[[], None]
     callbacks: Callable[[], tuple[CallbackFigures, ...]]
     chains: Callable[[], tuple[ChainFigures, ...]]
-    on_report: Callable[[int], None]
-    key: str
-    participant: str
+    nodes: Callable[[], Mapping[str, ManagedNode]]
+    recreate: Callable[[ManagedNode], str | None]
+    expect_end: Callable[[], None]
+    save_recording: Callable[[Callable[[bool, str], None]], None]
+    write_log: Write
 
 
 class ReportPublisher:
     """Publishes reports of the system. Use it on ``loop``, except for :meth:`publish_soon`."""
 
-    def __init__(self, node: Node, loop: Loop, events: EventCounts, sources: ReportSources) -> None:
-        self._node = node
+    def __init__(
+        self, process: ProcessContext, loop: Loop, context: ManagerContext, participant: str
+    ) -> None:
+        """Signed reports name the ``participant`` of the process."""
+        self._node = process.manager
         self._loop = loop
         self._clock = loop.clock
-        self._events = events
-        self._sources = sources
+        self._events = process.events
+        self._context = context
+        #: The process in reports; empty if they are not signed.
+        self.participant = participant if context.report_key else ""
         self._started_s = self._clock.monotonic()
+        self._times = ReportTimes()
         self._publish_due = threading.Lock()  # held while a message with changes is due
         self._batch_s = _BATCH_S
         self._changed_s = self._due_s = 0.0  # monotonic: the last change, when it is published
@@ -215,31 +268,34 @@ class ReportPublisher:
 
     def report(self) -> SystemReport:
         """Return the current report. Thread-safe."""
-        status = self._sources.status.snapshot()
-        participant = self._sources.participant if self._sources.key else ""
+        status = self._context.status.snapshot()
         timings = self.timings() if self.includes_timings else TimingReport()
         called = (item for item in timings.callbacks if item.count or item.dropped)
         return replace(
             status,
             at_s=self._now_s,
             number=self.number,
-            participant=participant,
+            participant=self.participant,
             callbacks=tuple(replace(item, histogram="") for item in called),
             chains=timings.chains,
         )
 
     def timings(self) -> TimingReport:
         """Return the current timings. Thread-safe."""
-        return TimingReport(self._sources.callbacks(), self._sources.chains(), self._now_s)
+        return TimingReport(self._context.callbacks(), self._context.chains(), self._now_s)
 
     def tick(self) -> None:
         """Publish for subscriptions. Call it every second."""
         if self._state.get_subscription_count() or self._diagnostics.get_subscription_count():
             self.publish()
         else:
-            self._sources.on_report(self.number)
+            self._times.note(self.number, self._clock.monotonic())
         if self._callbacks.get_subscription_count():
             self._publish_callbacks()
+
+    def is_outdated(self, number: int) -> bool:
+        """Return whether the sender of a request had last seen a report that is too old."""
+        return self._times.is_outdated(number, self._clock.monotonic())
 
     def publish_soon(self) -> None:
         """Publish a change, with others that follow. Thread-safe."""
@@ -253,10 +309,10 @@ class ReportPublisher:
         start_s = self._clock.monotonic()
         self.number += 1
         report = self.report()
-        self._state.publish(String(data=signed(encode(report), self._sources.key)))
-        self._sources.on_report(self.number)
+        self._state.publish(String(data=signed(encode(report), self._context.report_key)))
+        self._times.note(self.number, self._clock.monotonic())
         if self._diagnostics.get_subscription_count():
-            chains, callbacks = self._sources.chains(), self._sources.callbacks()
+            chains, callbacks = self._context.chains(), self._context.callbacks()
             self._diagnostics.publish(diagnostic_array(report, self.uptime_s, chains, callbacks))
         self._published_s = self._clock.monotonic()
         took_s = self._published_s - start_s

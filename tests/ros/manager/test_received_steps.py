@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.manager.member_service import ReceivedSteps, ReportTimes
+from composer.runtime.manager.member_service import ReceivedSteps
+from composer.runtime.manager.publishing import ReportTimes
 from composer.runtime.protocol.requests import Step
 
 FIRST, SECOND = (Step(number, "activate", "/arm") for number in (1, 2))

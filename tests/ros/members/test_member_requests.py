@@ -13,13 +13,16 @@ from std_msgs.msg import String
 
 from composer.model import ExecutorKind
 from composer.runtime.children.child_processes import ChildProcesses
+from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.sources import Reply
-from composer.runtime.manager.member_service import MemberCallbacks, MemberService
+from composer.runtime.manager.member_service import MemberService
+from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
 from composer.runtime.members.context import MemberContext, ProcessUnavailable
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
+from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import SystemReport
@@ -31,6 +34,7 @@ from composer.runtime.ros.manager_interface import (
     read_request,
 )
 from composer.runtime.ros_graph.graph import participant, servers_of
+from composer.runtime.supervision.status import Status
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench
 
@@ -174,7 +178,7 @@ def test_an_error_of_discovery_does_not_keep_requests_from_being_sent(
 
 
 def test_a_process_that_is_not_meant_neither_follows_nor_answers(
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(member_requests, "_DISCOVERED_WITHIN_S", 0.0)
     asked: list[str] = []
@@ -183,9 +187,16 @@ def test_a_process_that_is_not_meant_neither_follows_nor_answers(
         asked.append("")
 
     with bench(ExecutorKind.EVENTS) as on:
-        callbacks = MemberCallbacks(dict, *[nothing] * 4, "")
-        member = MemberService(on.loop, callbacks, MEANT, nothing)
-        member.on_report(1)
+        status = Status(system_of("{system: robot, nodes: {leg: {}}}", tmp_path), on.loop.clock)
+        context = ManagerContext(
+            *(status, "key", nothing, nothing, nothing),
+            *(tuple, tuple, dict, nothing, nothing, nothing, nothing),
+        )
+        unused: Any = None
+        process = ProcessContext(on.node, unused, EventCounts(on.loop), unused)
+        reports = ReportPublisher(process, on.loop, context, MEANT)
+        on.loop.run(reports.publish)
+        member = MemberService(on.loop, context, reports, nothing)
         on.serve(
             RequestService,
             SERVICE,
