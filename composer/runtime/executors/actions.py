@@ -28,8 +28,8 @@ from unique_identifier_msgs.msg import UUID
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors import readiness
+from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.readiness import Handle, SetCallback, Signal
-from composer.runtime.executors.tasks import TaskRunner
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class ActionSource:
     """Everything that an action server or client receives, one item at a time."""
 
     def __init__(
-        self, waitable: ActionServer | ActionClient, executor: object, loop: TaskRunner
+        self, waitable: ActionServer | ActionClient, executor: object, loop: BaseLoop
     ) -> None:
         self._waitable: Any = waitable
         self._role = _SERVER if isinstance(waitable, ActionServer) else _CLIENT

@@ -30,7 +30,7 @@ from composer.runtime.executors.sources import (
     Taken,
     rclpy_callback,
 )
-from composer.runtime.executors.tasks import Report, TaskRunner, name_of
+from composer.runtime.executors.tasks import Report, name_of
 
 
 class Loop(Scheduler):
@@ -147,7 +147,7 @@ class NodeExecutor:
     An ActionServer runs goals by ``create_task``, rclpy's futures their done callbacks.
     """
 
-    def __init__(self, loop: TaskRunner) -> None:
+    def __init__(self, loop: Loop) -> None:
         self._loop = loop
 
     def create_task(self, callback: Callable[..., Any], *args: Any, **kwargs: Any) -> RclpyFuture:

@@ -15,25 +15,12 @@ from typing import Any, Protocol, TypeVar
 
 from composer.runtime.executors.futures import Future, awaited_rclpy_future, wrap_future
 from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.turns import TurnTaking
 
 T = TypeVar("T")
 
 #: Handles one item; a coroutine that it returns is awaited. Must not raise.
 Work = Callable[[T], "Coroutine[Any, Any, None] | None"]
-
-
-class OverlappingLoop(Protocol):
-    """The part of a loop that strands need."""
-
-    @property
-    def is_parallel(self) -> bool:
-        """Whether callbacks may overlap."""
-
-    def overlap(self) -> None:
-        """Let other threads serve the loop while a callback runs, if it is parallel."""
-
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the loop as soon as it is free."""
 
 
 class Strand(Protocol):
@@ -61,7 +48,7 @@ class InlineStrand:
 class ReentrantStrand(InlineStrand):
     """The strand of a reentrant callback group: its callbacks overlap on several threads."""
 
-    def __init__(self, loop: OverlappingLoop) -> None:
+    def __init__(self, loop: TurnTaking) -> None:
         self._loop = loop
 
     def post(self, call: Callable[[], object]) -> None:
@@ -73,7 +60,7 @@ class ReentrantStrand(InlineStrand):
 class SerialStrand:
     """The strand of a node whose callbacks the loop may let overlap or wait."""
 
-    def __init__(self, loop: OverlappingLoop) -> None:
+    def __init__(self, loop: TurnTaking) -> None:
         self._call_soon = loop.call_soon
         self._overlap = loop.overlap if loop.is_parallel else None
         self._lock = threading.Lock()

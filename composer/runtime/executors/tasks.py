@@ -41,16 +41,6 @@ class SupportsCallLater(Protocol):
         """Call ``callback`` once, ``delay_s`` seconds from now."""
 
 
-class TaskRunner(SupportsCallLater, Protocol):
-    """The part of a loop that runs rclpy's own code."""
-
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` on the loop as soon as it is free."""
-
-    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; return the future of its result."""
-
-
 class Task(Generic[T]):
     """Runs one coroutine, a step per call of the loop.
 

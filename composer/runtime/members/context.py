@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol
 
 from rclpy.node import Node as RosNode
 
@@ -16,32 +15,10 @@ from composer.runtime.children.child_processes import ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
 from composer.runtime.process.instance_lock import REPORT_KEY_VARIABLE
-from composer.runtime.protocol.reports import NodeReport
 
 
 class ProcessUnavailable(Exception):
     """The process cannot be started, or has ended; the text is the reason."""
-
-
-class Member(Protocol):
-    """A node of the process. Called on the loop."""
-
-    @property
-    def full_name(self) -> str:
-        """Its name in reports."""
-
-    @property
-    def state(self) -> str:
-        """Its lifecycle state, as far as this process knows."""
-
-    def on_report(self, reported: NodeReport) -> None:
-        """Receive its state, with each report."""
-
-    def on_process_end(self, reason: str) -> None:
-        """Receive that the process has ended or does not report any more."""
-
-    def on_process_return(self) -> None:
-        """Receive that the process is there again, without a start from here."""
 
 
 @dataclass(frozen=True, slots=True)

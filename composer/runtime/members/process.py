@@ -13,6 +13,7 @@ import os
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
+from typing import TYPE_CHECKING
 
 from composer.model import LogLevel, Process
 from composer.model.lifecycle import ACTIVE, FINALIZED, INACTIVE, PRIMARY_STATES
@@ -22,11 +23,7 @@ from composer.runtime.children.output import attribute_line, process_loggers
 from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
-from composer.runtime.members.context import (
-    Member,
-    MemberContext,
-    ProcessUnavailable,
-)
+from composer.runtime.members.context import MemberContext, ProcessUnavailable
 from composer.runtime.members.lives import (
     REPORTS_WITHIN_S,
     MemberLife,
@@ -38,6 +35,9 @@ from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held
 from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import NAME, REQUEST, StepResult
+
+if TYPE_CHECKING:
+    from composer.runtime.members.node import MemberNode
 
 #: How long a process may take to import ROS, join the graph and report, on a busy machine.
 STARTS_WITHIN_S = 30.0
@@ -57,7 +57,7 @@ class MemberProcess:
         self._context = context
         self._clock = context.loop.clock
         self._name = context.full_name(process)
-        self._members: dict[str, Member] = {}
+        self._members: dict[str, MemberNode] = {}
         #: When, by the clock of the loop, it last reported that a node has moved.
         self.moved_s = 0.0
         self._lives = MemberLives(self._name, str(self), context, self._fail)
@@ -72,7 +72,7 @@ class MemberProcess:
         )
         self._reports = MemberReports(self._name, context, self._on_report, self._warn)
 
-    def add(self, member: Member) -> None:
+    def add(self, member: MemberNode) -> None:
         """Add a node, in place of an earlier one of the same name."""
         self._members[member.full_name] = member
         self._lives.figures.setdefault(member.full_name, NodeFigures())

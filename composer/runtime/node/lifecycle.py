@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from lifecycle_msgs.msg import State, Transition, TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
@@ -39,26 +39,13 @@ from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import ManagedLifecycle, TransitionOutcome
 from composer.runtime.ros.limited_requests import TooLarge, limited
 
+if TYPE_CHECKING:
+    from composer.runtime.node.local_node import LocalNode
+
 _NAMES = {number: name for name, item in TRANSITIONS.items() for number in item.ids.values()}
 _Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
 _LABEL_LENGTH = 80
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"
-
-
-class Hooks(Protocol):
-    """What a node does in its transitions.
-
-    TransitionFailed refuses a transition; any other exception starts error processing.
-    """
-
-    async def on_transition(self, transition: str, start: str) -> None:
-        """Do the work of ``transition``, which started in the state ``start``."""
-
-    async def on_error(self, cause: BaseException) -> None:
-        """Clean up after a transition that raised ``cause``. Raising finalizes the node."""
-
-    def on_transition_end(self, result: TransitionOutcome) -> None:
-        """Adapt to the primary state that a transition ended in."""
 
 
 class TransitionTimeout(Exception):
@@ -73,16 +60,20 @@ class Lifecycle(ManagedLifecycle):
     """
 
     def __init__(
-        self, context: NodeContext, hooks: Hooks, *, timeout_s: float, services: bool = True
+        self, context: NodeContext, owner: LocalNode, *, timeout_s: float, services: bool = True
     ) -> None:
-        """Join the graph. Without ``services`` there is only the topic ``transition_event``."""
+        """Join the graph. Without ``services`` there is only the topic ``transition_event``.
+
+        ``owner`` does the work of transitions: TransitionFailed refuses one, any other exception
+        starts error processing.
+        """
         super().__init__()
         node = context.node
         loop = context.loop
         self._node = node
         self._loop = loop
         self._strand = context.strand
-        self._hooks = hooks
+        self._owner = owner
         self._log = context.log
         self._statistics = context.statistics
         self._timeout_s = timeout_s
@@ -170,7 +161,7 @@ class Lifecycle(ManagedLifecycle):
             return self._refuse(transition, f"the node is {start}")
         self._trigger(transition_id)
         cause = await self._attempt(
-            transition, partial(self._hooks.on_transition, transition, start)
+            transition, partial(self._owner.on_transition, transition, start)
         )
         reason = ""
         if cause is None:
@@ -185,7 +176,7 @@ class Lifecycle(ManagedLifecycle):
         result = TransitionOutcome(
             transition, self.state, success=cause is None, reason=reason, requested=requested
         )
-        self._hooks.on_transition_end(result)
+        self._owner.on_transition_end(result)
         return result
 
     def _trigger(self, transition: int | str) -> None:
@@ -224,7 +215,7 @@ class Lifecycle(ManagedLifecycle):
 
     async def _process_error(self, cause: BaseException) -> None:
         try:
-            await self._in_time(partial(self._hooks.on_error, cause))
+            await self._in_time(partial(self._owner.on_error, cause))
         except BaseException as error:
             if is_closing(error):
                 raise

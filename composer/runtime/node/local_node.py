@@ -233,7 +233,7 @@ class LocalNode(ManagedNode):
         await self._call_user(transition)
 
     async def on_error(self, cause: BaseException) -> None:
-        """Let the user's code clean up."""
+        """Let the user's code clean up. What it raises finalizes the node."""
         self._begin_transition()
         await self._deactivate(self._context, self._entities.gated)
         await self._deactivate(self._always_on_context, self._entities.always_on)
