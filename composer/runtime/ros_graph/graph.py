@@ -22,6 +22,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
+from composer.model import ChannelKind, PortKind
 from composer.model.names import join_node_name
 from composer.runtime.middleware.dds_participants import ended_participants
 from composer.runtime.protocol.requests import NameAndTypes
@@ -48,6 +49,17 @@ _MAX_SKIPPED = 1000
 _INVALID = "not a valid name in ROS"
 #: Queries that raise one of these concern a node that has left, or that announces odd names.
 _REFUSED = (RuntimeError, ValueError, NameValidationException)
+
+
+#: The part of the names of rclpy's queries.
+_QUERIES = {
+    PortKind.PUBLISHER: "publisher",
+    PortKind.SUBSCRIPTION: "subscriber",
+    PortKind.SERVICE: "service",
+    PortKind.CLIENT: "client",
+    PortKind.ACTION_SERVER: "action_server",
+    PortKind.ACTION_CLIENT: "action_client",
+}
 
 
 class Skipped:
@@ -179,49 +191,21 @@ class RosGraph:
         """Return all actions."""
         return self._valid("action", _actions().get_action_names_and_types(self._node))
 
-    def publishers_of(self, node: NodeName) -> list[NameAndTypes]:
-        """Return the topics that a node publishes."""
-        return self._of("topic", self._node.get_publisher_names_and_types_by_node, node)
-
-    def subscriptions_of(self, node: NodeName) -> list[NameAndTypes]:
-        """Return the topics that a node subscribes to."""
-        return self._of("topic", self._node.get_subscriber_names_and_types_by_node, node)
-
-    def services_of(self, node: NodeName) -> list[NameAndTypes]:
-        """Return the services that a node provides."""
-        return self._of("service", self._node.get_service_names_and_types_by_node, node)
-
-    def clients_of(self, node: NodeName) -> list[NameAndTypes]:
-        """Return the services that a node calls."""
-        return self._of("service", self._node.get_client_names_and_types_by_node, node)
-
-    def action_servers_of(self, node: NodeName) -> list[NameAndTypes]:
-        """Return the actions that a node provides."""
-        return self._of(
-            "action",
-            lambda *at: _actions().get_action_server_names_and_types_by_node(self._node, *at),
-            node,
-        )
-
-    def action_clients_of(self, node: NodeName) -> list[NameAndTypes]:
-        """Return the actions that a node sends goals to."""
-        return self._of(
-            "action",
-            lambda *at: _actions().get_action_client_names_and_types_by_node(self._node, *at),
-            node,
-        )
+    def ends_of(self, node: NodeName, kind: PortKind) -> list[NameAndTypes]:
+        """Return the topics, services or actions of which a node has endpoints of a kind."""
+        query = f"get_{_QUERIES[kind]}_names_and_types_by_node"
+        try:
+            if kind.channel is ChannelKind.ACTION:
+                found = getattr(_actions(), query)(self._node, *node)
+            else:
+                found = getattr(self._node, query)(*node)
+            return self._valid(kind.channel.value, found)
+        except _REFUSED:
+            return []
 
     def topic(self, name: str, types: tuple[str, ...]) -> TopicInfo:
         """Return the endpoints of a topic by its full, valid name."""
         return topic_info(self._node, name, types)
-
-    def _of(
-        self, kind: str, query: Callable[..., Iterable[tuple[str, list[str]]]], node: NodeName
-    ) -> list[NameAndTypes]:
-        try:
-            return self._valid(kind, query(*node))
-        except _REFUSED:
-            return []
 
     def _valid(self, kind: str, found: Iterable[tuple[str, list[str]]]) -> list[NameAndTypes]:
         return [

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, TypeAlias
 
-from composer.model import PortKind
+from composer.model import ChannelKind, PortKind
 from composer.model.names import is_hidden, join_node_name, split_node_name
 from composer.plan.drift import ObservedEndpoint
-from composer.runtime.protocol.requests import NameAndTypes
 from composer.runtime.ros_graph.graph import NodeName, RosGraph
-
-#: The endpoints of a node, by the keys under which they are listed.
-_QUERIES: Mapping[str, Callable[[RosGraph, NodeName], list[NameAndTypes]]] = {
-    "subscriptions": RosGraph.subscriptions_of,
-    "publishers": RosGraph.publishers_of,
-    "services": RosGraph.services_of,
-    "clients": RosGraph.clients_of,
-    "action_servers": RosGraph.action_servers_of,
-    "action_clients": RosGraph.action_clients_of,
-}
 
 
 def details(graph: RosGraph, kind: str, name: str, types: tuple[str, ...]) -> dict[str, Any]:
@@ -30,18 +19,25 @@ def details(graph: RosGraph, kind: str, name: str, types: tuple[str, ...]) -> di
     if kind == "topic":
         return graph.topic(name, types).plain()
     if kind == "node":
-        namespace, base_name = split_node_name(name)
-        where = (base_name, namespace)
         return {"name": name} | {
-            key: sorted(query(graph, where)) for key, query in _QUERIES.items()
+            each.section: sorted(graph.ends_of(_split(name), each)) for each in PortKind
         }
-    servers, clients = [], []
-    for node, _ in graph.names("node"):
-        namespace, base_name = split_node_name(node)
-        where = (base_name, namespace)
-        servers += [node for found, _ in graph.action_servers_of(where) if found == name]
-        clients += [node for found, _ in graph.action_clients_of(where) if found == name]
+    ends = {
+        each: [
+            node
+            for node, _ in graph.names("node")
+            for action, _ in graph.ends_of(_split(node), each)
+            if action == name
+        ]
+        for each in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT)
+    }
+    servers, clients = ends.values()
     return {"name": name, "types": list(types), "servers": servers, "clients": clients}
+
+
+def _split(full_name: str) -> NodeName:
+    namespace, name = split_node_name(full_name)
+    return name, namespace
 
 
 #: The order of endpoints of a node.
@@ -75,14 +71,10 @@ def _endpoints_by_node(graph: RosGraph) -> _Ends:
 
 
 def _services_and_actions(graph: RosGraph, full_name: str) -> Iterator[ObservedEndpoint]:
-    namespace, name = split_node_name(full_name)
-    for kind, query in (
-        (PortKind.SERVICE, graph.services_of),
-        (PortKind.CLIENT, graph.clients_of),
-        (PortKind.ACTION_SERVER, graph.action_servers_of),
-        (PortKind.ACTION_CLIENT, graph.action_clients_of),
-    ):
-        for found, types in query((name, namespace)):
+    for kind in PortKind:
+        if kind.channel is ChannelKind.TOPIC:
+            continue
+        for found, types in graph.ends_of(_split(full_name), kind):
             if not is_hidden(found):
                 yield from (ObservedEndpoint(kind, found, type_name) for type_name in types)
 
