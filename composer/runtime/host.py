@@ -269,8 +269,7 @@ class Host:
             self._node_set.create(process, self._limits.limit_start)
             self._limits.limit_phase(self._longest_bring_up_s())
         except CreationFailed as error:
-            at_s = self._reporter.elapsed_s
-            self._reporter.report(events.RollingBack(at_s, error.node, str(error)))
+            self._reporter.report(events.RollingBack, error.node, str(error))
             self._fail(f"{error.node} failed")
             return False
         for warning in self._node_set.warnings:
@@ -314,8 +313,7 @@ class Host:
             self._main_queue.request_stop("--for elapsed")
 
     def _run_command(self, command: Command) -> None:
-        at_s = self._reporter.elapsed_s
-        self._reporter.report(events.Commanded(at_s, command.name, command.nodes))
+        self._reporter.report(events.Commanded, command.name, command.nodes)
         command.answer(*self._commands.run(command))
 
     def _warn(self, text: str) -> None:

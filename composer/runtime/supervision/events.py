@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Concatenate, ParamSpec, TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel
@@ -189,6 +189,7 @@ Event: TypeAlias = (
     " | NodeFailed | Restarted | Commanded | CallbackFailed | Stopping | Stuck"
 )
 Report: TypeAlias = Callable[[Event], None]
+P = ParamSpec("P")
 
 
 class Reporter:
@@ -212,11 +213,17 @@ class Reporter:
         """The seconds since the start, for events."""
         return self._clock.monotonic() - self._started_at_s
 
-    def report(self, event: Event) -> None:
-        """Pass an event to the listener."""
+    def report(
+        self,
+        kind: Callable[Concatenate[float, P], Event],
+        *details: P.args,
+        **more_details: P.kwargs,
+    ) -> None:
+        """Pass an event of this kind to the listener: it happens now."""
         with self._lock:
             if self._listener is None:
                 return
+            event = kind(self.elapsed_s, *details, **more_details)
             try:
                 self._listener(event)
             except Exception:  # such as a closed pipe
@@ -224,7 +231,7 @@ class Reporter:
 
     def log(self, level: LogLevel, logger: str, message: str) -> None:
         """Report a line of the log."""
-        self.report(Logged(self.elapsed_s, logger, level, message))
+        self.report(Logged, logger, level, message)
 
 
 #: The counters of a :class:`NodeSummary`.

@@ -89,7 +89,7 @@ class FaultHandler:
             key = decision.reason, decision.consequence, is_tolerated, decision.is_finished
             nodes.setdefault(key, []).append(self._full_name(fault.node))
         for key, names in nodes.items():
-            self._reporter.report(NodeFailed(self._reporter.elapsed_s, tuple(names), *key))
+            self._reporter.report(NodeFailed, tuple(names), *key)
 
     def _finish(self, fault: Fault, decision: Decision, now_s: float) -> None:
         """Schedule the restart of a node that is down now."""

@@ -178,8 +178,7 @@ class HealthMonitor:
         if observed.interrupted_s is None:
             observed.interrupted_s = now_s
             action = f"return from {callback.name} within {1000.0 * observed.limit_s:g} ms"
-            at_s, stack = self._reporter.elapsed_s, callback.stack()
-            self._reporter.report(Stuck(at_s, self._full_name(node), action, stack))
+            self._reporter.report(Stuck, self._full_name(node), action, callback.stack())
             # Otherwise the next callback hangs as soon as this one returns.
             self._node_set.nodes[node].block()
             callback.interrupt()

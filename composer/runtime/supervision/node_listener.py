@@ -47,12 +47,11 @@ class SupervisionListener:
     def on_transition_end(self, result: TransitionOutcome) -> None:
         """Report the new state; record a requested transition first."""
         item = self._record(result) if result.requested else None
-        at_s = self._reporter.elapsed_s
-        transition, state = result.transition, result.state
+        state = result.state
         self._status.set_state(self._name, state)
         if state != self._last_state:  # otherwise, the transition has failed
             self._last_state = state
-            self._reporter.report(events.StateChanged(at_s, self._full_name, transition, state))
+            self._reporter.report(events.StateChanged, self._full_name, result.transition, state)
         if item is not None:
             self._main_queue.put(item)
 
@@ -71,8 +70,7 @@ class SupervisionListener:
     def on_error(self, callback: str, text: str) -> None:
         """Report an error of user code."""
         self._status.set_error(self._name, f"{callback}: {text}")
-        at_s = self._reporter.elapsed_s
-        self._reporter.report(events.CallbackFailed(at_s, self._full_name, callback, text))
+        self._reporter.report(events.CallbackFailed, self._full_name, callback, text)
 
     def on_fault(self, kind: FaultKind, text: str) -> None:
         """Report that the node has failed: it says so, or has exceeded its ``max_errors``."""
@@ -89,8 +87,7 @@ class SupervisionListener:
         self._desired.update(lambda desired: desired.await_fault(fault))
         self._status.set_state(self._name, state)
         self._last_state = state
-        at_s = self._reporter.elapsed_s
-        self._reporter.report(events.StateChanged(at_s, self._full_name, "end", state))
+        self._reporter.report(events.StateChanged, self._full_name, "end", state)
         self._main_queue.put(fault)
 
     def on_returned(self) -> None:

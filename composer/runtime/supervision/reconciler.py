@@ -154,15 +154,14 @@ class Reconciler:
 
         ``node`` has failed for ``reason``.
         """
-        report = self.reporter.report
-        report(RollingBack(self.reporter.elapsed_s, node, reason))
+        self.reporter.report(RollingBack, node, reason)
         causes = dict.fromkeys(self.node_set.nodes, f"{node} failed")
         desired = self.desired
         kept = {name: at for name, at in before.items() if not desired.has_moved(name, since)}
         plan = plan_transitions(self.system, self.node_set.states(), kept, causes)
         self._plan_executor.execute(plan, ExecutionOptions(best_effort=True, serial=since))
         undone = tuple(dict.fromkeys(step.full_name for step in plan.steps))
-        report(RolledBack(self.reporter.elapsed_s, undone))
+        self.reporter.report(RolledBack, undone)
 
     def note_restart(self, name: str, attempt: int) -> None:
         """Report the node once it is where it should be, unless it is moved or fails before."""
@@ -183,8 +182,7 @@ class Reconciler:
                 del self._restarted[name]
             elif states.get(name) is goal and name not in desired.unhandled:
                 del self._restarted[name]
-                at_s, full_name = self.reporter.elapsed_s, self._full_name(name)
-                self.reporter.report(Restarted(at_s, full_name, attempt, str(goal)))
+                self.reporter.report(Restarted, self._full_name(name), attempt, str(goal))
 
     def publish_desired(self) -> None:
         """Publish the desired states, and what becomes of failed nodes."""
@@ -199,15 +197,12 @@ class Reconciler:
 
     def _report_failed_step(self, failure: StepFailed) -> None:
         step = failure.step
-        at_s = self.reporter.elapsed_s
+        node, transition = step.full_name, step.transition
         if failure.stuck:
-            self.reporter.report(Stuck(at_s, step.full_name, step.transition, failure.stack))
+            self.reporter.report(Stuck, node, transition, failure.stack)
         else:
-            self.reporter.report(
-                NodeTransitionFailed(
-                    at_s, step.full_name, step.transition, failure.state, failure.reason
-                )
-            )
+            details = node, transition, failure.state, failure.reason
+            self.reporter.report(NodeTransitionFailed, *details)
 
     def _full_name(self, name: str) -> str:
         return self.node_set.nodes[name].full_name

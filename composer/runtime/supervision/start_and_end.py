@@ -68,15 +68,9 @@ class SystemStart:
             self._take_over(*found)
         if problem is None and not self.main_queue.stopping:
             status = self.status.snapshot()
-            self.reporter.report(
-                BroughtUp(
-                    self.reporter.elapsed_s,
-                    self.node_set.active(),
-                    len(self.node_set.nodes),
-                    status.remarks,
-                    is_complete=not status.failed,
-                )
-            )
+            active, nodes = self.node_set.active(), len(self.node_set.nodes)
+            is_complete = not status.failed
+            self.reporter.report(BroughtUp, active, nodes, status.remarks, is_complete)
         return problem
 
     def _wait_for_processes(self, within_s: float) -> None:
@@ -161,7 +155,7 @@ class SystemEnd:
         # The reason begins with the node that has ended the system, if one has.
         ended_by = self._reason.partition(" ")[0]
         self._remarks = tuple(text for text in remarks if not text.startswith(f"{ended_by} is "))
-        self._reporter.report(Stopping(self._reporter.elapsed_s, self._reason))
+        self._reporter.report(Stopping, self._reason)
         self.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._end_s = self._clock.monotonic() + stop_within_s
