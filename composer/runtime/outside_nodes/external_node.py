@@ -5,20 +5,18 @@ from __future__ import annotations
 from composer.model import External, Node
 from composer.model.lifecycle import ACTIVE, INACTIVE, TRANSITIONS, UNCONFIGURED
 from composer.runtime.outside_nodes.outside_node import (
+    ObservedNode,
     OutsideContext,
-    OutsideNode,
     TransitionRefused,
     elsewhere_text,
-    missing_text,
 )
-from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteLifecycle
+from composer.runtime.outside_nodes.remote_node import NotAnswered
 
 #: How often an external node is looked for.
 PERIOD_S = 0.5
-_NOTHING_EARLIER: frozenset[bytes] = frozenset()
 
 
-class ExternalNode(OutsideNode):
+class ExternalNode(ObservedNode):
     """The :class:`.ManagedNode` of an external node.
 
     It is active once its ports are in the ROS graph. It is driven by its lifecycle services only if
@@ -26,18 +24,14 @@ class ExternalNode(OutsideNode):
     """
 
     def __init__(self, model: Node, external: External, context: OutsideContext) -> None:
-        super().__init__(model, context)
-        self._external = external
-        self._manager = context.manager
-        self._presence = NodePresence(self._manager, model)
-        self._remote: RemoteLifecycle | None = None
+        super().__init__(model, external, context)
         self._is_left = False
         self._timer = self.loop.call_every(PERIOD_S, self._check)
 
     @property
     def transition_timeout_s(self) -> float:
         """How long a transition may take, including the time until the node appears."""
-        return self._timeout_s + self._external.ready_timeout_s
+        return self._timeout_s + self._outside.ready_timeout_s
 
     def destroy(self) -> None:
         """Stop to observe the node."""
@@ -51,29 +45,27 @@ class ExternalNode(OutsideNode):
     async def _work(self, transition: str) -> None:
         if self._is_left:
             return
-        if self._external.is_managed and transition != "shutdown":
+        if self._outside.is_managed and transition != "shutdown":
             await self._work_managed(transition)
         elif transition == "activate":
-            await self._await_ports()
+            await self._await(INACTIVE)
         if transition in ("cleanup", "shutdown"):
             self._close_remote()
 
-    def _is_there(self) -> bool:
-        """Return whether it can be used: with its service if it is managed, or all its ports."""
-        if self._external.is_managed:
-            service = f"{self.full_name}/change_state"
-            return self._presence.has_service(service, _NOTHING_EARLIER)
-        return self._presence.has_node() and not self._presence.missing()
-
-    async def _await_ports(self) -> None:
-        end_s = self.loop.clock.monotonic() + self._external.ready_timeout_s
-        if not await self._until_ready(self._is_there, end_s):
-            self._refuse_absent(missing_text(self._presence.missing()), INACTIVE)
+    async def _await(self, state: str) -> None:
+        """Wait until it can be used. Otherwise, raise TransitionRefused with ``state``."""
+        limit_s = self._outside.ready_timeout_s
+        if not await self._until_ready(self._is_there, self.loop.clock.monotonic() + limit_s):
+            self._is_lost = True
+            elsewhere = elsewhere_text(self.model, self._presence.names_elsewhere())
+            advice = elsewhere or "; start it, or see 'ros2 node list'"
+            raise TransitionRefused(f"{self._missing()} after {limit_s:g} s{advice}", state)
         self._is_lost = False
 
     async def _work_managed(self, transition: str) -> None:
         if transition == "configure":
-            await self._connect()
+            await self._await(UNCONFIGURED)
+            self._connect_remote()
         if self._remote is None:
             raise TransitionRefused("it is not connected", UNCONFIGURED)
         end_s = self.loop.clock.monotonic() + self._timeout_s
@@ -89,33 +81,12 @@ class ExternalNode(OutsideNode):
             text = f"{error} within {self._timeout_s:g} s"
             raise TransitionRefused(text, UNCONFIGURED) from error
 
-    async def _connect(self) -> None:
-        self._close_remote()
-        end_s = self.loop.clock.monotonic() + self._external.ready_timeout_s
-        if not await self._until_ready(self._is_there, end_s):
-            missing = f"it has no service {self.full_name}/change_state"
-            self._refuse_absent(missing, UNCONFIGURED)
-        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
-        self._is_lost = False
-
-    def _refuse_absent(self, missing: str, state: str) -> None:
-        limit = f"after {self._external.ready_timeout_s:g} s"
-        self._is_lost = True
-        elsewhere = elsewhere_text(self.model, self._presence.names_elsewhere())
-        advice = elsewhere or "; start it, or see 'ros2 node list'"
-        raise TransitionRefused(f"{missing} {limit}{advice}", state)
-
-    def _close_remote(self) -> None:
-        if self._remote is not None:
-            self._remote.close()
-            self._remote = None
-
     def _check(self) -> None:
         """Notice that the node disappears, and that it returns."""
         if self._lock.is_held or self.state not in (UNCONFIGURED, INACTIVE, ACTIVE):
             return
         is_used = self.state == ACTIVE or self._remote is not None
-        if is_used and not self._presence.has_node():
+        if is_used and not self._presence.has_node(self.earlier):
             self._is_lost = True
             self._close_remote()
             self._fail("it has disappeared from the ROS graph", is_awaited=True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Mapping, Set
 
 from rclpy.node import Node as RosNode
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel, Node, Port
+from composer.model import LogLevel, Node, Outside
 from composer.model.lifecycle import (
     ACTIVE,
     FINALIZED,
@@ -31,7 +31,7 @@ from composer.runtime.node.managed_node import (
     TransitionLock,
     TransitionOutcome,
 )
-from composer.runtime.outside_nodes.remote_node import DONE_IN
+from composer.runtime.outside_nodes.remote_node import DONE_IN, NodePresence, RemoteLifecycle
 
 #: The transitions by the states in which they run.
 _BY_DURING = {item.during: name for name, item in TRANSITIONS.items()}
@@ -197,13 +197,47 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         return True
 
 
-def missing_text(ports: Iterable[Port]) -> str:
-    """Return which ports a node does not have, in words; without ports, the node is missing."""
-    names = [f"{port.kind} {port.full_name}" for port in ports]
-    if not names:
-        return "it is not in the ROS graph"
-    more = len(names) - _MAX_MISSING
-    return f"it has no {', '.join(names[:_MAX_MISSING])}" + (f" and {more} more" * (more > 0))
+class ObservedNode(OutsideNode):
+    """A node of another program, which is looked for in the ROS graph.
+
+    With ``lifecycle: managed``, its lifecycle services drive it.
+    """
+
+    def __init__(self, model: Node, outside: Outside, context: OutsideContext) -> None:
+        super().__init__(model, context)
+        self._outside = outside
+        self._manager = context.manager
+        self._presence = NodePresence(self._manager, model)
+        self._remote: RemoteLifecycle | None = None
+
+    def _is_there(self) -> bool:
+        """Return whether it can be used: with its service if it is managed, or all its ports."""
+        if self._outside.is_managed:
+            return self._presence.has_service(self._service, self.earlier)
+        return self._presence.has_node(self.earlier) and not self._presence.missing(self.earlier)
+
+    def _missing(self) -> str:
+        """Return what it does not have yet, in words; without ports, the node is missing."""
+        if self._outside.is_managed:
+            return f"it has no service {self._service}"
+        names = [f"{port.kind} {port.full_name}" for port in self._presence.missing(self.earlier)]
+        if not names:
+            return "it is not in the ROS graph"
+        more = len(names) - _MAX_MISSING
+        return f"it has no {', '.join(names[:_MAX_MISSING])}" + f" and {more} more" * (more > 0)
+
+    @property
+    def _service(self) -> str:
+        return f"{self.full_name}/change_state"
+
+    def _connect_remote(self) -> None:
+        self._close_remote()
+        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
+
+    def _close_remote(self) -> None:
+        if self._remote is not None:
+            self._remote.close()
+            self._remote = None
 
 
 def elsewhere_text(model: Node, names: Set[str]) -> str:

@@ -50,7 +50,7 @@ class NodePresence:
             found += self._endpoints(port)
         return frozenset(map(participant, self._own(found)))
 
-    def has_node(self, earlier: frozenset[bytes] = frozenset()) -> bool:
+    def has_node(self, earlier: frozenset[bytes]) -> bool:
         """Return whether the node is in the graph, and not only as part of ``earlier``."""
         if not self._are_known or self.participants() - earlier:
             return True
@@ -77,7 +77,7 @@ class NodePresence:
         name = self._model.ros_name.value
         return {join_node_name(namespace, last) for last, namespace in nodes if last == name}
 
-    def missing(self, earlier: frozenset[bytes] = frozenset()) -> tuple[Port, ...]:
+    def missing(self, earlier: frozenset[bytes]) -> tuple[Port, ...]:
         """Return the declared ports that the node does not have yet."""
         return tuple(
             port

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -11,12 +11,11 @@ from composer.model import Node, Outside
 from composer.model.lifecycle import INACTIVE, UNCONFIGURED
 from composer.runtime.executors.futures import Future
 from composer.runtime.outside_nodes.outside_node import (
+    ObservedNode,
     OutsideContext,
-    OutsideNode,
     TransitionRefused,
-    missing_text,
 )
-from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteLifecycle
+from composer.runtime.outside_nodes.remote_node import NotAnswered
 
 #: The longest share of the time that is left for the shutdown of the system.
 END_SHARE = 0.5
@@ -38,7 +37,7 @@ class Ended(Exception):
     """What has been started has ended meanwhile."""
 
 
-class StartedNode(OutsideNode, Generic[R]):
+class StartedNode(ObservedNode, Generic[R]):
     """The :class:`.ManagedNode` of a node that this process starts and ends.
 
     *Configure* looks for it, *activate* starts it and waits for its ports, *deactivate* ends it: an
@@ -51,13 +50,9 @@ class StartedNode(OutsideNode, Generic[R]):
     _when_silent: str
 
     def __init__(self, model: Node, outside: Outside, context: OutsideContext) -> None:
-        super().__init__(model, context)
-        self._outside = outside
-        self._manager = context.manager
+        super().__init__(model, outside, context)
         self._log_level = context.log_level
-        self._presence = NodePresence(self._manager, model)
         self._started: R | None = None
-        self._remote: RemoteLifecycle | None = None
 
     @abstractmethod
     def _find(self) -> None:
@@ -93,26 +88,17 @@ class StartedNode(OutsideNode, Generic[R]):
             await self._end()
 
     async def _activate(self) -> None:
-        run = await self._start(INACTIVE)
+        await self._await(await self._start(INACTIVE), INACTIVE)
 
-        def is_there() -> bool:
-            return self._presence.has_node(self.earlier) and not self._missing()
-
-        await self._await(run, is_there, lambda: missing_text(self._missing()), INACTIVE)
-
-    def _missing(self) -> Any:
-        return self._presence.missing(self.earlier)
-
-    async def _await(
-        self, run: R, is_ready: Callable[[], bool], missing: Callable[[], str], state: str
-    ) -> None:
+    async def _await(self, run: R, state: str) -> None:
         """Wait until it is ready. Otherwise, end it, and raise TransitionRefused with ``state``."""
         end_s = self.loop.clock.monotonic() + self._outside.ready_timeout_s
         ended = run.ended
-        if await self._until_ready(lambda: ended.done() or is_ready(), end_s) and not ended.done():
+        is_over = await self._until_ready(lambda: ended.done() or self._is_there(), end_s)
+        if is_over and not ended.done():
             self._on_ready(run)
             return
-        reason = self._how_ended(run) or self._not_ready(run, missing())
+        reason = self._how_ended(run) or self._not_ready(run, self._missing())
         await self._end()
         raise TransitionRefused(reason, state)
 
@@ -134,13 +120,8 @@ class StartedNode(OutsideNode, Generic[R]):
             return
         self._find()
         run = await self._start(UNCONFIGURED)
-        self._remote = RemoteLifecycle(self._manager, self.loop, self.full_name, self._on_state)
-        service = f"{self.full_name}/change_state"
-
-        def has_service() -> bool:
-            return self._presence.has_service(service, self.earlier)
-
-        await self._await(run, has_service, lambda: f"no service {service}", UNCONFIGURED)
+        self._connect_remote()
+        await self._await(run, UNCONFIGURED)
 
     async def _change(self, transition: str) -> None:
         """Run a transition of the node by its services."""
@@ -175,11 +156,6 @@ class StartedNode(OutsideNode, Generic[R]):
         if self._end_s is None:
             return limit_s
         return min(limit_s, max(0.0, self._end_s - self.loop.clock.monotonic()) * END_SHARE)
-
-    def _close_remote(self) -> None:
-        if self._remote is not None:
-            self._remote.close()
-            self._remote = None
 
     # --- its end
 
