@@ -65,7 +65,12 @@ from composer.runtime.supervision import events
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Outcome, Report, Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor
-from composer.runtime.supervision.main_queue import Command, Item, MainQueue
+from composer.runtime.supervision.main_queue import (
+    Command,
+    Item,
+    MainQueue,
+    SupervisionContext,
+)
 from composer.runtime.supervision.node_factory import NodeFactory
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet
@@ -108,13 +113,13 @@ class Host:
             *(self._reporter.log, self._main_queue.together),
         )
         self._node_set = NodeSet(system, factory)
-        self._supervisor = Supervisor(
-            Reconciler(system, self._node_set, self._main_queue, self._status, self._reporter)
+        self._context = context = SupervisionContext(
+            *(system, self._node_set, self._main_queue, self._status, self._reporter)
         )
-        self._commands = Commands(system, self._node_set, self._supervisor, self._status)
+        self._supervisor = Supervisor(Reconciler(context))
+        self._commands = Commands(context, self._supervisor)
         self._start = SystemStart(
-            *(system, up, self._node_set, self._supervisor, self._main_queue),
-            *(self._reporter, self._status, self._run_command, self._options.all_or_nothing),
+            *(context, self._supervisor, up, self._run_command, self._options.all_or_nothing)
         )
         self._end = SystemEnd(down, self._supervisor, self._options)
         self._limits = TimeLimits(self._options)
@@ -260,9 +265,7 @@ class Host:
         return min(once_s, self._options.bring_up_within_s) + steps_s
 
     def _make_listener(self, node: Node) -> NodeListener:
-        return SupervisionListener(
-            node, self._supervisor.reconciler.shared, self._main_queue, self._status, self._reporter
-        )
+        return SupervisionListener(node, self._context)
 
     def _create(self, process: ProcessContext) -> bool:
         try:
@@ -283,13 +286,7 @@ class Host:
         return True
 
     def _bring_up_and_supervise(self) -> None:
-        monitor = HealthMonitor(
-            self._node_set,
-            self._supervisor.reconciler.shared,
-            self._main_queue.put,
-            self._reporter,
-            self._clock,
-        )
+        monitor = HealthMonitor(self._context)
         monitor.start()
         try:
             if self._bring_up():

@@ -19,6 +19,7 @@ from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.main_queue import (
     Command,
     NodeEvent,
+    SupervisionContext,
 )
 from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.reconciler import Reconciler
@@ -51,18 +52,18 @@ class Supervision(RuleBasedStateMachine):
         self.system = SYSTEM
         self.world = World()
         self.queue = NotedQueue(self.world)
-        reporter = Reporter(None, COMPUTER)
-        status = Status(self.system, COMPUTER)
-        node_set = cast("NodeSet", self.world)
-        self.supervisor = Supervisor(
-            Reconciler(self.system, node_set, self.queue, status, reporter)
+        context = SupervisionContext(
+            self.system,
+            cast("NodeSet", self.world),
+            self.queue,
+            Status(self.system, COMPUTER),
+            Reporter(None, COMPUTER),
         )
-        self.commands = Commands(self.system, node_set, self.supervisor, status)
+        self.supervisor = Supervisor(Reconciler(context))
+        self.commands = Commands(context, self.supervisor)
         listener_of: dict[str, SupervisionListener] = {}
         for model in self.system.nodes:
-            listener = SupervisionListener(
-                model, self.supervisor.reconciler.shared, self.queue, status, reporter
-            )
+            listener = SupervisionListener(model, context)
             listener_of[model.name.value] = listener
             self.world.nodes[model.name.value] = SimulatedNode(model, self.world, listener)
         self.listener = listener_of[EXTERNAL]

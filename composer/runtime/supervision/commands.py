@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import PrimaryState, System
+from composer.model import PrimaryState
 from composer.model.lifecycle import FINALIZED
 from composer.plan import (
     blocked_nodes,
@@ -25,12 +24,8 @@ from composer.plan import (
     start_causes,
     start_goals,
 )
-from composer.runtime.supervision.main_queue import Command
-from composer.runtime.supervision.status import Status
+from composer.runtime.supervision.main_queue import Command, SupervisionContext
 from composer.runtime.supervision.supervisor import Supervisor
-
-if TYPE_CHECKING:  # this module and its tests need no ROS
-    from composer.runtime.supervision.node_set import NodeSet
 
 _ACTIVITIES = {
     "startup": ("starting", "running"),
@@ -47,10 +42,8 @@ _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 class Commands:
     """Runs commands, on the main thread."""
 
-    system: System
-    node_set: NodeSet
+    context: SupervisionContext
     supervisor: Supervisor
-    status: Status
 
     def run(self, command: Command) -> tuple[bool, str]:
         """Run a command; return whether it succeeded, and the problem and state of the system."""
@@ -58,13 +51,13 @@ class Commands:
             problem = self._restart(command.nodes, self.supervisor.desired.serial)
         else:
             problem = self._run_for_system(command.name, together=command.all_or_nothing)
-        summary = self.status.snapshot().message
+        summary = self.context.status.snapshot().message
         return problem is None, summary if problem is None else f"{problem}; {summary}"
 
     def _run_for_system(self, name: str, *, together: bool) -> str | None:
         doing, done = _ACTIVITIES[name]
-        before = self.status.without_nodes.activity
-        self.status.set_activity(doing)
+        before = self.context.status.without_nodes.activity
+        self.context.status.set_activity(doing)
         actions: dict[str, Callable[[int], str | None]] = {
             "startup": partial(self._start_up, together=together),
             "pause": self._pause,
@@ -72,7 +65,7 @@ class Commands:
             "reset": self._reset,
         }
         problem = actions[name](self.supervisor.desired.serial)
-        self.status.set_activity(done if problem is None else before)
+        self.context.status.set_activity(done if problem is None else before)
         return problem
 
     # The actions move no node that has been moved on request since the serial number ``since``.
@@ -86,7 +79,7 @@ class Commands:
 
     def _resume(self, since: int, *, together: bool) -> str | None:
         """Nodes that depend on a failed one come up after it."""
-        states = self.node_set.states()
+        states = self.context.node_set.states()
         inactive = {name for name, at in states.items() if at is PrimaryState.INACTIVE}
         return self._bring_up(inactive, since, together=together)
 
@@ -99,7 +92,7 @@ class Commands:
         return self._lower(goals, since, "the system is paused", "paused")
 
     def _reset(self, since: int) -> str | None:
-        goals = dict.fromkeys(self.node_set.nodes, PrimaryState.UNCONFIGURED)
+        goals = dict.fromkeys(self.context.node_set.nodes, PrimaryState.UNCONFIGURED)
         problem = self._lower(goals, since, "the system is reset", "reset", forget_failures=True)
         return problem or self._recreate(since)
 
@@ -108,13 +101,17 @@ class Commands:
 
         A node that was shut down, or not brought up, is started.
         """
-        names = [name for name, node in self.node_set.nodes.items() if node.full_name in full_names]
+        names = [
+            name
+            for name, node in self.context.node_set.nodes.items()
+            if node.full_name in full_names
+        ]
         for name in names:
-            if self.node_set.is_lost(name):
-                return f"{self.node_set.nodes[name].full_name} hangs and cannot be restarted"
+            if self.context.node_set.is_lost(name):
+                return f"{self.context.full_name(name)} hangs and cannot be restarted"
         for failure in self.supervisor.take_down(names, "restart requested"):
             name = failure.step.node
-            if name in names and self.node_set.nodes[name].state not in _DOWN:
+            if name in names and self.context.node_set.nodes[name].state not in _DOWN:
                 return str(failure)
         goals = self._start_goals()
         started = {
@@ -141,13 +138,15 @@ class Commands:
         """Bring nodes up; with ``together``, undo it if one fails that the system needs."""
         start_goals = self._start_goals()
         goals = {name: start_goals[name] for name in names}
-        left = {*optional_nodes(self.system)}
+        left = {*optional_nodes(self.context.system)}
         if not forget_failures:
-            left |= blocked_nodes(self.system, self.supervisor.desired).keys()
+            left |= blocked_nodes(self.context.system, self.supervisor.desired).keys()
         needed = {name: goal for name, goal in goals.items() if name not in left}
         if together:
-            causes = start_causes(self.system, PrimaryState.ACTIVE)
-            plan = plan_transitions(self.system, self.node_set.states(), needed, causes)
+            causes = start_causes(self.context.system, PrimaryState.ACTIVE)
+            plan = plan_transitions(
+                self.context.system, self.context.node_set.states(), needed, causes
+            )
             problem = self.supervisor.bring_up_together(plan, since)
             if problem is not None:
                 return f"{problem}; rolled back"
@@ -155,10 +154,10 @@ class Commands:
         self.supervisor.reconciler.reconcile_settled("bring-up requested")
         self.supervisor.settle()
         desired = self.supervisor.desired
-        failed = [self.node_set.nodes[name].full_name for name in needed if name in desired.down]
+        failed = [self.context.full_name(name) for name in needed if name in desired.down]
         if failed:
             return f"{', '.join(failed)} failed"
-        blocked = {*blocked_nodes(self.system, desired), *desired.ignored}
+        blocked = {*blocked_nodes(self.context.system, desired), *desired.ignored}
         return self._unreached({name: needed[name] for name in needed if name not in blocked})
 
     def _lower(
@@ -176,29 +175,31 @@ class Commands:
 
     def _unreached(self, goals: Mapping[str, PrimaryState]) -> str | None:
         """Name a node that could not be moved: its executor hangs, or a transition runs."""
-        states = self.node_set.states()
+        states = self.context.node_set.states()
         for name, goal in goals.items():
             if states.get(name) is not goal:
-                node = self.node_set.nodes[name]
+                node = self.context.node_set.nodes[name]
                 return f"{node.full_name} is {node.state} and cannot be moved"
         return None
 
     def _unreached_of(self, names: Collection[str]) -> str | None:
         """Name a restarted node that has not reached its goal, as one it depends on is down."""
         desired = self.supervisor.desired
-        blocked = blocked_nodes(self.system, desired)
+        blocked = blocked_nodes(self.context.system, desired)
         return self._unreached({name: desired.goals[name] for name in names if name not in blocked})
 
     def _start_goals(self) -> Mapping[str, PrimaryState]:
-        return start_goals(self.system, PrimaryState.ACTIVE)
+        return start_goals(self.context.system, PrimaryState.ACTIVE)
 
     def _recreate(self, since: int, names: Collection[str] | None = None) -> str | None:
         """Create finalized nodes again, by default all; return why one cannot be created."""
-        for name, node in tuple(self.node_set.nodes.items()):
+        for name, node in tuple(self.context.node_set.nodes.items()):
             if names is not None and name not in names:
                 continue
-            problem = self.node_set.recreate(name, partial(self.supervisor.has_moved, name, since))
-            self.status.update_states({name: self.node_set.nodes[name].state})
+            problem = self.context.node_set.recreate(
+                name, partial(self.supervisor.has_moved, name, since)
+            )
+            self.context.status.update_states({name: self.context.node_set.nodes[name].state})
             if problem is not None:
                 return f"{node.full_name}: {problem}"
         return None

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
 from types import FrameType
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState
 from composer.plan import Fault, FaultKind
-from composer.runtime.clock.clock import Clock
 from composer.runtime.node.managed_node import ManagedNode
-from composer.runtime.supervision.events import Reporter, Stuck
+from composer.runtime.supervision.events import Stuck
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
-from composer.runtime.supervision.main_queue import (
-    LoopRecovered,
-    NodeEvent,
-    SharedDesiredState,
-)
+from composer.runtime.supervision.main_queue import LoopRecovered, SupervisionContext
 from composer.runtime.supervision.node_set import NodeSet
 
 _SHORTEST_PERIOD_S = 0.005
@@ -50,29 +44,20 @@ class _ObservedCallback:
 class HealthMonitor:
     """A thread that checks the nodes of a node set periodically and reports failures."""
 
-    def __init__(
-        self,
-        node_set: NodeSet,
-        desired: SharedDesiredState,
-        report: Callable[[NodeEvent], None],
-        reporter: Reporter,
-        clock: Clock,
-    ) -> None:
-        """``report`` receives failures; the user sees by ``reporter`` which callbacks take long."""
-        self._node_set = node_set
-        self._desired = desired
-        self._clock = clock
+    def __init__(self, context: SupervisionContext) -> None:
+        self._context = context
+        self._clock = context.clock
         self._serial = 0  # of the desired state before the check
-        self._report = report
-        self._reporter = reporter
         self._end = threading.Event()
         self._callbacks: dict[FrameType, _ObservedCallback] = {}  # by their calls
         self._reported: set[tuple[str, str]] = set()  # nodes and their callbacks that block
         # What nodes of other processes send is not known here; those of the system check it there.
-        own = [name for name, node in node_set.nodes.items() if node.model.in_process]
-        self._silences = [item for name in own for item in _silences(name, node_set.nodes[name])]
+        own = [name for name, node in context.node_set.nodes.items() if node.model.in_process]
+        self._silences = [
+            item for name in own for item in _silences(name, context.node_set.nodes[name])
+        ]
         self._silent: dict[str, _Activation] = {}  # nodes that were reported in their activation
-        self._period_s = _period_s(node_set)
+        self._period_s = _period_s(context.node_set)
         self._checked_s = self._clock.monotonic()
         self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="health monitor", daemon=True)
@@ -84,7 +69,7 @@ class HealthMonitor:
     def system_is_up(self) -> None:
         """Check silence and errors from now on: during the bring-up, some nodes wait for others."""
         self._system_is_up = True
-        for node in self._node_set.nodes.values():
+        for node in self._context.node_set.nodes.values():
             node.count_errors()
 
     def stop(self) -> None:
@@ -96,7 +81,7 @@ class HealthMonitor:
     def _run(self) -> None:
         while not self._clock.wait(self._end, self._period_s):
             now_s = self._clock.monotonic()
-            self._serial = self._desired.value.serial
+            self._serial = self._context.desired.value.serial
             self._forgive_delay(now_s)
             self._check_callbacks(now_s)
             self._check_hung_loops(now_s)
@@ -106,16 +91,18 @@ class HealthMonitor:
     def _check_silences(self, now_s: float) -> None:
         """Check the publishers of nodes, except on blocked loops, which cannot publish."""
         interrupted = [item for item in self._callbacks.values() if item.interrupted_s is not None]
-        blocked = {item.loop for item in interrupted} | self._node_set.hung
+        blocked = {item.loop for item in interrupted} | self._context.node_set.hung
         for silence in self._silences:
-            node = self._node_set.nodes[silence.node]
+            node = self._context.node_set.nodes[silence.node]
             if node.state != PrimaryState.ACTIVE or node.loop.name in blocked:
                 continue
             activation = (node, node.activations)
             text = silence.check(activation, now_s)
             if text is not None and self._silent.get(silence.node) != activation:
                 self._silent[silence.node] = activation
-                self._report(Fault(silence.node, FaultKind.SILENCE, text, self._serial))
+                self._context.main_queue.put(
+                    Fault(silence.node, FaultKind.SILENCE, text, self._serial)
+                )
 
     # --- callbacks
 
@@ -131,7 +118,7 @@ class HealthMonitor:
 
     def _check_callbacks(self, now_s: float) -> None:
         before, self._callbacks = self._callbacks, {}
-        for loop in tuple(self._node_set.loops.values()):
+        for loop in tuple(self._context.node_set.loops.values()):
             for stack in running_callbacks(loop.busy_threads()):
                 for callback in stack:
                     observed = before.pop(callback.call, None)
@@ -157,7 +144,7 @@ class HealthMonitor:
 
     def _identify(self, observed: _ObservedCallback) -> None:
         """Set the node of a callback and its limit, unless the node was just created again."""
-        nodes = dict(self._node_set.nodes)
+        nodes = dict(self._context.node_set.nodes)
         owner = observed.callback.node(nodes.values())
         for name, node in nodes.items():
             if node is owner:
@@ -172,20 +159,22 @@ class HealthMonitor:
                 self._reported.add((node, callback.name))
                 # Once: it may be meant to, or it may hang.
                 text = f"{callback.name} has not returned for {lasts_s:.0f} s; it is at"
-                logger = self._full_name(node).strip("/").replace("/", ".")
-                self._reporter.log(LogLevel.WARN, logger, f"{text} {callback.location()}")
+                logger = self._context.full_name(node).strip("/").replace("/", ".")
+                self._context.reporter.log(LogLevel.WARN, logger, f"{text} {callback.location()}")
             return
         if observed.interrupted_s is None:
             observed.interrupted_s = now_s
             action = f"return from {callback.name} within {1000.0 * observed.limit_s:g} ms"
-            self._reporter.report(Stuck, self._full_name(node), action, callback.stack())
+            self._context.reporter.report(
+                Stuck, self._context.full_name(node), action, callback.stack()
+            )
             # Otherwise the next callback hangs as soon as this one returns.
-            self._node_set.nodes[node].block()
+            self._context.node_set.nodes[node].block()
             callback.interrupt()
         elif not observed.is_lost and now_s - observed.interrupted_s > _RETURNS_WITHIN_S:
             observed.is_lost = True
             text = f"{callback.name} does not return"
-            self._report(Fault(node, FaultKind.LOST, text, self._serial))
+            self._context.main_queue.put(Fault(node, FaultKind.LOST, text, self._serial))
 
     def _on_return(self, observed: _ObservedCallback) -> None:
         """Report the end of a callback that was interrupted."""
@@ -193,19 +182,18 @@ class HealthMonitor:
             return
         if not (observed.is_lost or observed.callback.in_transition):
             text = f"{observed.callback.name} took longer than {1000.0 * observed.limit_s:g} ms"
-            self._report(Fault(observed.node, FaultKind.CALLBACK, text, self._serial))
-
-    def _full_name(self, name: str) -> str:
-        return self._node_set.nodes[name].full_name
+            self._context.main_queue.put(
+                Fault(observed.node, FaultKind.CALLBACK, text, self._serial)
+            )
 
     def _check_hung_loops(self, now_s: float) -> None:
         """Report hung loops that run again, at each check until the supervisor has handled it."""
-        for loop in tuple(self._node_set.hung):
+        for loop in tuple(self._context.node_set.hung):
             ages_s = [
                 now_s - item.since_s for item in self._callbacks.values() if item.loop == loop
             ]
             if max(ages_s, default=0.0) < _RECOVERED_WITHIN_S:
-                self._report(LoopRecovered(loop))
+                self._context.main_queue.put(LoopRecovered(loop))
 
 
 def _limit_s(callback: RunningCallback, node: ManagedNode) -> float:

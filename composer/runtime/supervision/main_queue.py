@@ -7,12 +7,19 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Generic, TypeAlias, TypeVar
+from dataclasses import field
+from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar
 
 from composer.base.fast_dataclass import dataclass
+from composer.model import System
 from composer.plan import DesiredState, Fault
 from composer.runtime.clock.clock import Clock
 from composer.runtime.process.signals import wakeup_for
+from composer.runtime.supervision.events import Reporter
+from composer.runtime.supervision.status import Status
+
+if TYPE_CHECKING:  # tests of the supervision run without ROS
+    from composer.runtime.supervision.node_set import NodeSet
 
 
 class SharedDesiredState:
@@ -192,3 +199,25 @@ class MainQueue(Generic[T]):
             if not self.wakeup.wait(until_s):
                 break
         return condition()
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisionContext:
+    """What all parts of the supervision of a system share."""
+
+    system: System
+    node_set: NodeSet
+    main_queue: MainQueue[Item]
+    status: Status
+    reporter: Reporter
+    #: Also changed by the nodes, which record requested transitions.
+    desired: SharedDesiredState = field(default_factory=SharedDesiredState)
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of the system."""
+        return self.main_queue.clock
+
+    def full_name(self, name: str) -> str:
+        """Return the full name of a node, by its key."""
+        return self.node_set.nodes[name].full_name

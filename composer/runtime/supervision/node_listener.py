@@ -10,12 +10,10 @@ from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision import events
 from composer.runtime.supervision.main_queue import (
     Item,
-    MainQueue,
     NodeMoved,
     NodeReturned,
-    SharedDesiredState,
+    SupervisionContext,
 )
-from composer.runtime.supervision.status import Status
 
 _DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
@@ -28,53 +26,47 @@ class SupervisionListener:
     may have to move. The plan executor waits for the result of a step.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        desired: SharedDesiredState,
-        main_queue: MainQueue[Item],
-        status: Status,
-        reporter: events.Reporter,
-    ) -> None:
+    def __init__(self, node: Node, context: SupervisionContext) -> None:
         self._name = node.name.value
         self._full_name = node.full_name
-        self._desired = desired
-        self._main_queue = main_queue
-        self._status = status
-        self._reporter = reporter
+        self._context = context
         self._last_state = ""
 
     def on_transition_end(self, result: TransitionOutcome) -> None:
         """Report the new state; record a requested transition first."""
         item = self._record(result) if result.requested else None
         state = result.state
-        self._status.set_state(self._name, state)
+        self._context.status.set_state(self._name, state)
         if state != self._last_state:  # otherwise, the transition has failed
             self._last_state = state
-            self._reporter.report(events.StateChanged, self._full_name, result.transition, state)
+            self._context.reporter.report(
+                events.StateChanged, self._full_name, result.transition, state
+            )
         if item is not None:
-            self._main_queue.put(item)
+            self._context.main_queue.put(item)
 
     def _record(self, result: TransitionOutcome) -> Item:
         """Record a requested transition; return the item for the supervisor."""
         name = self._name
         if result.state == TRANSITIONS[result.transition].goal:
             goal = REACHED[result.transition]
-            self._desired.update(lambda desired: desired.move(name, goal))
+            self._context.desired.update(lambda desired: desired.move(name, goal))
         elif result.state in _DOWN:
             text = f"{result.transition} ended in an error: {result.reason}"
-            serial = self._desired.update(lambda desired: desired.break_down(name)).serial
+            serial = self._context.desired.update(lambda desired: desired.break_down(name)).serial
             return Fault(name, FaultKind.TRANSITION, text, serial)
         return NodeMoved(name, f"requested transition of {self._full_name}")
 
     def on_error(self, callback: str, text: str) -> None:
         """Report an error of user code."""
-        self._status.set_error(self._name, f"{callback}: {text}")
-        self._reporter.report(events.CallbackFailed, self._full_name, callback, text)
+        self._context.status.set_error(self._name, f"{callback}: {text}")
+        self._context.reporter.report(events.CallbackFailed, self._full_name, callback, text)
 
     def on_fault(self, kind: FaultKind, text: str) -> None:
         """Report that the node has failed: it says so, or has exceeded its ``max_errors``."""
-        self._main_queue.put(Fault(self._name, kind, text, self._desired.value.serial))
+        self._context.main_queue.put(
+            Fault(self._name, kind, text, self._context.desired.value.serial)
+        )
 
     def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
         """Report that a node outside the process has ended by itself, and its new state.
@@ -83,17 +75,17 @@ class SupervisionListener:
         plan moves the node until the supervisor has handled the fault.
         """
         kind = FaultKind.ABSENT if is_awaited else FaultKind.ENDED
-        fault = Fault(self._name, kind, text, self._desired.value.serial)
-        self._desired.update(lambda desired: desired.await_fault(fault))
-        self._status.set_state(self._name, state)
+        fault = Fault(self._name, kind, text, self._context.desired.value.serial)
+        self._context.desired.update(lambda desired: desired.await_fault(fault))
+        self._context.status.set_state(self._name, state)
         self._last_state = state
-        self._reporter.report(events.StateChanged, self._full_name, "end", state)
-        self._main_queue.put(fault)
+        self._context.reporter.report(events.StateChanged, self._full_name, "end", state)
+        self._context.main_queue.put(fault)
 
     def on_returned(self) -> None:
         """Report that a node that had disappeared by itself is there again."""
-        self._main_queue.put(NodeReturned(self._name))
+        self._context.main_queue.put(NodeReturned(self._name))
 
     def write_log(self, level: LogLevel, logger: str, message: str) -> None:
         """Report a line of the log."""
-        self._reporter.log(level, logger, message)
+        self._context.reporter.log(level, logger, message)

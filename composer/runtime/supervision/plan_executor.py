@@ -6,16 +6,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from composer.plan import Plan, Step
-from composer.runtime.supervision.main_queue import (
-    Item,
-    MainQueue,
-    NodeMoved,
-    SharedDesiredState,
-    StepEnded,
-)
+from composer.runtime.supervision.main_queue import NodeMoved, StepEnded, SupervisionContext
 from composer.runtime.supervision.phases import (
     ExecutionOptions,
     Phase,
@@ -23,9 +16,6 @@ from composer.runtime.supervision.phases import (
     StepFailed,
     wait_for_step,
 )
-
-if TYPE_CHECKING:  # this module and its tests need no ROS
-    from composer.runtime.supervision.node_set import NodeSet
 
 #: A transition times out by itself; only a callback that does not return takes this much longer.
 _STUCK_AFTER_S = 1.0
@@ -37,17 +27,10 @@ class PlanExecutor:
     """Executes plans, one at a time, on the main thread."""
 
     def __init__(
-        self,
-        node_set: NodeSet,
-        desired: SharedDesiredState,
-        main_queue: MainQueue[Item],
-        report_failure: Callable[[StepFailed], None],
+        self, context: SupervisionContext, report_failure: Callable[[StepFailed], None]
     ) -> None:
         """Call ``report_failure`` for each failed step as soon as it has failed, or is stuck."""
-        self._node_set = node_set
-        self._desired = desired
-        self._main_queue = main_queue
-        self._clock = main_queue.clock
+        self._context = context
         self._report_failure = report_failure
         self._detached: dict[str, RunningStep] = {}
 
@@ -70,7 +53,7 @@ class PlanExecutor:
         done: set[int] = set()
         unreached: set[int] = set()
         for steps in plan.phases:
-            phase = Phase(deque(steps), options, self._node_set.process_of, done, unreached)
+            phase = Phase(deque(steps), options, self._context.node_set.process_of, done, unreached)
             self._execute(phase)
             options = phase.options  # the time limit may have moved
             failures += phase.failures
@@ -82,12 +65,12 @@ class PlanExecutor:
 
     def _execute(self, phase: Phase) -> None:
         while self._start_ready(phase):
-            wait_for_step(phase, self._main_queue)
+            wait_for_step(phase, self._context.main_queue)
             if self._is_stopped(phase.options):
                 return
             while phase.ended:
                 self._end(phase.ended.popleft(), phase)
-            if self._main_queue.urgent or self._clock.monotonic() >= phase.check_s:
+            if self._context.main_queue.urgent or self._context.clock.monotonic() >= phase.check_s:
                 self._end_late(phase)
         for item in phase.running.values():
             self._detach(item)
@@ -95,7 +78,7 @@ class PlanExecutor:
     def _start_ready(self, phase: Phase) -> bool:
         """Start every step that can start; return whether one was started that is awaited."""
         while ready := phase.take_ready():
-            with self._node_set.other_processes.requests_together():
+            with self._context.node_set.other_processes.requests_together():
                 for step, after in ready:
                     self._start(step, after, phase)
         return phase.is_awaited
@@ -103,37 +86,37 @@ class PlanExecutor:
     def _detach(self, item: RunningStep) -> None:
         name = item.step.node
         self._detached[name] = item
-        item.future.add_done_callback(lambda _: self._main_queue.put(StepEnded(name)))
+        item.future.add_done_callback(lambda _: self._context.main_queue.put(StepEnded(name)))
 
     def _end_late(self, phase: Phase) -> None:
         """End the steps that have no time left."""
         self._update_start_times(phase.running.values())
         for number, item in tuple(phase.running.items()):
-            if self._main_queue.urgent or self._clock.monotonic() >= item.until_s:
+            if self._context.main_queue.urgent or self._context.clock.monotonic() >= item.until_s:
                 self._end(number, phase)
         phase.check_s = min((item.until_s for item in phase.running.values()), default=math.inf)
 
     def _update_start_times(self, running: Iterable[RunningStep]) -> None:
         """Restart the time limit of each step with the last transition that its loop started."""
         starts_s: dict[str, float] = {}
-        for node in self._node_set.nodes.values():
+        for node in self._context.node_set.nodes.values():
             loop = node.loop.name
             starts_s[loop] = max(node.transition_started_s, starts_s.get(loop, 0.0))
         for item in running:
             item.started_s = max(item.started_s, starts_s.get(item.loop, 0.0))
 
     def _is_stopped(self, options: ExecutionOptions) -> bool:
-        return self._main_queue.stopping and options.stoppable
+        return self._context.main_queue.stopping and options.stoppable
 
     def _start(self, step: Step, after: Sequence[Step], phase: Phase) -> None:
-        node = self._node_set.nodes[step.node]
+        node = self._context.node_set.nodes[step.node]
         options = phase.options
-        now_s = self._clock.monotonic()
+        now_s = self._context.clock.monotonic()
         # A tear-down waits for the steps of earlier plans.
         is_running = step.node in self._detached
         is_possible = step.transition in node.lifecycle.available and not is_running
         if options.best_effort and (
-            self._node_set.is_lost(step.node)
+            self._context.node_set.is_lost(step.node)
             or not (is_possible or (is_running and not options.stoppable))
             or now_s >= options.end_s
         ):
@@ -142,7 +125,7 @@ class PlanExecutor:
         limit_s = min(node.transition_timeout_s + _STUCK_AFTER_S, options.step_limit_s)
         is_outdated = partial(self._is_outdated, step, options)
         others = tuple(other.full_name for other in after)
-        future = self._node_set.run_step(step.node, step.transition, is_outdated, others)
+        future = self._context.node_set.run_step(step.node, step.transition, is_outdated, others)
         name = node.loop.name
         item = RunningStep(step, name, future, now_s, limit_s, options.end_s)
         phase.running[step.number] = item
@@ -151,7 +134,7 @@ class PlanExecutor:
 
     def _on_done(self, phase: Phase, number: int, _: object) -> None:
         phase.ended.append(number)
-        self._main_queue.wakeup.wake()
+        self._context.main_queue.wakeup.wake()
 
     def _is_outdated(self, step: Step, options: ExecutionOptions) -> bool:
         """Return whether a requested transition or a fault came first.
@@ -159,10 +142,10 @@ class PlanExecutor:
         Called once no other transition can.
         """
         if options.serial is not None:
-            desired = self._desired.value
+            desired = self._context.desired.value
             has_failed = options.best_effort and step.node in desired.unhandled
             return has_failed or desired.has_moved(step.node, options.serial)
-        node = self._node_set.nodes[step.node]
+        node = self._context.node_set.nodes[step.node]
         return options.best_effort and step.transition not in node.lifecycle.available
 
     def _end(self, number: int, phase: Phase) -> None:
@@ -173,7 +156,7 @@ class PlanExecutor:
         phase.finish(item.step, is_reached=failure is None)
         if not item.future.done():
             moved = NodeMoved(item.step.node, f"late end of '{item.step.transition}'")
-            item.future.add_done_callback(lambda _: self._main_queue.put(moved))
+            item.future.add_done_callback(lambda _: self._context.main_queue.put(moved))
         if failure is not None and not (failure.outdated and phase.options.best_effort):
             phase.failures.append(failure)
             if not item.is_reported and (failure.stuck or not phase.options.are_faults):
@@ -181,14 +164,18 @@ class PlanExecutor:
 
     def _failure(self, item: RunningStep) -> StepFailed | None:
         """Return why a step failed that is done or out of time."""
-        node = self._node_set.nodes[item.step.node]
+        node = self._context.node_set.nodes[item.step.node]
         stack = ""
         if not item.future.done():
             stack = self._unblock(item)
         if not item.future.done():
             if stack:
-                self._node_set.hung.add(node.loop.name)
-            stuck = bool(stack) or self._main_queue.urgent or self._clock.monotonic() >= item.late_s
+                self._context.node_set.hung.add(node.loop.name)
+            stuck = (
+                bool(stack)
+                or self._context.main_queue.urgent
+                or self._context.clock.monotonic() >= item.late_s
+            )
             reason = "stuck" if stuck else "no time left"
             return StepFailed(item.step, reason, node.state, stuck=stuck, stack=stack)
         if item.future.cancelled():
@@ -211,12 +198,12 @@ class PlanExecutor:
 
         Until the step is late, only callbacks of the node itself are interrupted.
         """
-        node = self._node_set.nodes[item.step.node]
-        if self._node_set.is_lost(item.step.node):
+        node = self._context.node_set.nodes[item.step.node]
+        if self._context.node_set.is_lost(item.step.node):
             return node.loop.current_stack()
-        running = self._node_set.running_callbacks(item.step.node)
+        running = self._context.node_set.running_callbacks(item.step.node)
         own = [callback for callback in running if callback.node((node,)) is node]
-        if not own and self._clock.monotonic() < item.late_s:
+        if not own and self._context.clock.monotonic() < item.late_s:
             return ""
         stack = node.loop.current_stack()
         if running:  # report it now: once it is interrupted, the node may continue
@@ -226,6 +213,6 @@ class PlanExecutor:
         for callback in own or running:
             callback.interrupt()
         if running:
-            until_s = self._clock.monotonic() + _INTERRUPTED_WITHIN_S
-            self._main_queue.wait(item.future.done, until_s, stoppable=False)
+            until_s = self._context.clock.monotonic() + _INTERRUPTED_WITHIN_S
+            self._context.main_queue.wait(item.future.done, until_s, stoppable=False)
         return stack

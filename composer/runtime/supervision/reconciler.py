@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
 
-from composer.model import PrimaryState, System
+from composer.model import PrimaryState
 from composer.plan import (
     Condition,
     DesiredState,
@@ -22,49 +21,29 @@ from composer.plan import (
 )
 from composer.runtime.supervision.events import (
     NodeTransitionFailed,
-    Reporter,
     Restarted,
     RolledBack,
     RollingBack,
     Stuck,
 )
-from composer.runtime.supervision.main_queue import Item, MainQueue, SharedDesiredState
+from composer.runtime.supervision.main_queue import SupervisionContext
 from composer.runtime.supervision.phases import ExecutionOptions, StepFailed
 from composer.runtime.supervision.plan_executor import PlanExecutor
-from composer.runtime.supervision.status import Status
-
-if TYPE_CHECKING:  # this module and its tests need no ROS
-    from composer.runtime.supervision.node_set import NodeSet
 
 
 class Reconciler:
     """The desired state of a system, and the plans that lead to it. For the main thread."""
 
-    def __init__(
-        self,
-        system: System,
-        node_set: NodeSet,
-        main_queue: MainQueue[Item],
-        status: Status,
-        reporter: Reporter,
-    ) -> None:
-        self.system = system
-        self.node_set = node_set
-        #: Also changed by the nodes, which record requested transitions.
-        self.shared = SharedDesiredState()
-        self.main_queue = main_queue
-        self.status = status
-        self.reporter = reporter
-        self._plan_executor = PlanExecutor(
-            node_set, self.shared, main_queue, self._report_failed_step
-        )
+    def __init__(self, context: SupervisionContext) -> None:
+        self.context = context
+        self._plan_executor = PlanExecutor(context, self._report_failed_step)
         #: The nodes that are not up again after a restart: its number, and the serial number then.
         self._restarted: dict[str, tuple[int, int]] = {}
 
     @property
     def desired(self) -> DesiredState:
         """The desired state now."""
-        return self.shared.value
+        return self.context.desired.value
 
     @property
     def moving(self) -> Collection[str]:
@@ -74,7 +53,9 @@ class Reconciler:
     @property
     def is_settled(self) -> bool:
         """Whether all events are handled, and no required node is on its way up."""
-        return self.main_queue.is_empty and is_settled(self.system, self.desired, self.moving)
+        return self.context.main_queue.is_empty and is_settled(
+            self.context.system, self.desired, self.moving
+        )
 
     @property
     def absent(self) -> Collection[str]:
@@ -89,7 +70,7 @@ class Reconciler:
     def reconcile(self, cause: str) -> tuple[StepFailed, ...]:
         """Take every node to its desired state; failures on the way become faults."""
         desired = self.desired  # first: states that are newer outdate the steps of their nodes
-        return self._reconcile(desired, self.node_set.states(), cause)
+        return self._reconcile(desired, self.context.node_set.states(), cause)
 
     def reconcile_settled(self, cause: str = "", end_s: float = math.inf) -> None:
         """Reconcile, but without nodes with a fault in the queue: that is handled first.
@@ -99,7 +80,7 @@ class Reconciler:
         """
         desired = self.desired
         left = {*desired.unhandled, *self.absent}
-        states = self.node_set.states()
+        states = self.context.node_set.states()
         settled = {name: at for name, at in states.items() if name not in left}
         self._reconcile(desired, settled, cause, detaches=True, end_s=end_s)
 
@@ -112,7 +93,7 @@ class Reconciler:
         detaches: bool = False,
         end_s: float = math.inf,
     ) -> tuple[StepFailed, ...]:
-        plan = reconcile(self.system, desired, states, cause)
+        plan = reconcile(self.context.system, desired, states, cause)
         options = ExecutionOptions(
             best_effort=True,
             detaches=detaches,
@@ -134,16 +115,16 @@ class Reconciler:
             if not failure.stuck:  # otherwise, it is reported already
                 self._report_failed_step(failure)
             return
-        kind = FaultKind.ABSENT if self.node_set.nodes[name].is_absent else FaultKind.STEP
+        kind = FaultKind.ABSENT if self.context.node_set.nodes[name].is_absent else FaultKind.STEP
         fault = Fault(name, kind, failure.text, self.desired.serial)
-        self.shared.update(partial(DesiredState.await_fault, fault=fault))
-        self.main_queue.put(fault)
+        self.context.desired.update(partial(DesiredState.await_fault, fault=fault))
+        self.context.main_queue.put(fault)
 
     def end_step(self, name: str) -> None:
         """Handle the end of a step that has run on after its plan."""
         failure = self._plan_executor.end(name)
         if failure is None:
-            self.reconcile_settled(f"{self._full_name(name)} has moved")
+            self.reconcile_settled(f"{self.context.full_name(name)} has moved")
         else:
             self._on_failed_step(failure)
 
@@ -154,14 +135,14 @@ class Reconciler:
 
         ``node`` has failed for ``reason``.
         """
-        self.reporter.report(RollingBack, node, reason)
-        causes = dict.fromkeys(self.node_set.nodes, f"{node} failed")
+        self.context.reporter.report(RollingBack, node, reason)
+        causes = dict.fromkeys(self.context.node_set.nodes, f"{node} failed")
         desired = self.desired
         kept = {name: at for name, at in before.items() if not desired.has_moved(name, since)}
-        plan = plan_transitions(self.system, self.node_set.states(), kept, causes)
+        plan = plan_transitions(self.context.system, self.context.node_set.states(), kept, causes)
         self._plan_executor.execute(plan, ExecutionOptions(best_effort=True, serial=since))
         undone = tuple(dict.fromkeys(step.full_name for step in plan.steps))
-        self.reporter.report(RolledBack, undone)
+        self.context.reporter.report(RolledBack, undone)
 
     def note_restart(self, name: str, attempt: int) -> None:
         """Report the node once it is where it should be, unless it is moved or fails before."""
@@ -173,36 +154,35 @@ class Reconciler:
 
     def _report_restarted(self) -> None:
         """Report the nodes that are where they should be after a restart, each once."""
-        if self.main_queue.stopping:
+        if self.context.main_queue.stopping:
             return
-        desired, states = self.desired, self.node_set.states()
+        desired, states = self.desired, self.context.node_set.states()
         for name, (attempt, serial) in tuple(self._restarted.items()):
             goal = desired.goals.get(name)
             if desired.has_moved(name, serial) or goal in (None, PrimaryState.UNCONFIGURED):
                 del self._restarted[name]
             elif states.get(name) is goal and name not in desired.unhandled:
                 del self._restarted[name]
-                self.reporter.report(Restarted, self._full_name(name), attempt, str(goal))
+                self.context.reporter.report(
+                    Restarted, self.context.full_name(name), attempt, str(goal)
+                )
 
     def publish_desired(self) -> None:
         """Publish the desired states, and what becomes of failed nodes."""
         desired = self.desired
-        goals = desired_states(self.system, desired)
+        goals = desired_states(self.context.system, desired)
         states = {name: state.value for name, state in goals.items()}
         moving = self.moving
-        words = conditions(self.system, desired, self.node_set.states(), moving)
-        self.status.set_desired(states, desired.down, words)
+        words = conditions(self.context.system, desired, self.context.node_set.states(), moving)
+        self.context.status.set_desired(states, desired.down, words)
         if desired.goals:  # the bring-up is over
-            self.node_set.other_processes.keep_goals(desired.goals, desired.activity)
+            self.context.node_set.other_processes.keep_goals(desired.goals, desired.activity)
 
     def _report_failed_step(self, failure: StepFailed) -> None:
         step = failure.step
         node, transition = step.full_name, step.transition
         if failure.stuck:
-            self.reporter.report(Stuck, node, transition, failure.stack)
+            self.context.reporter.report(Stuck, node, transition, failure.stack)
         else:
             details = node, transition, failure.state, failure.reason
-            self.reporter.report(NodeTransitionFailed, *details)
-
-    def _full_name(self, name: str) -> str:
-        return self.node_set.nodes[name].full_name
+            self.context.reporter.report(NodeTransitionFailed, *details)

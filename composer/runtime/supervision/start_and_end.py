@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel, PrimaryState, System
+from composer.model import LogLevel, PrimaryState
 from composer.model.names import PROGRAM_LOGGER
 from composer.plan import Fault, Plan, optional_nodes, start_goals
 from composer.runtime.metrics.figures import merged_chains
@@ -20,16 +20,13 @@ from composer.runtime.supervision.events import (
     BroughtUp,
     NodeSummary,
     Outcome,
-    Reporter,
     Stopping,
 )
-from composer.runtime.supervision.main_queue import Command, Item, MainQueue
-from composer.runtime.supervision.status import Status
+from composer.runtime.supervision.main_queue import Command, SupervisionContext
 from composer.runtime.supervision.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from composer.runtime.host_options import HostOptions
-    from composer.runtime.supervision.node_set import NodeSet
 
 #: Processes report every second. Bring-up waits longer for those that are started only now.
 _REPORTS_WITHIN_S = 5.0
@@ -47,35 +44,31 @@ class SystemStart:
     before the end of the bring-up.
     """
 
-    system: System
-    up: Plan
-    node_set: NodeSet
+    context: SupervisionContext
     supervisor: Supervisor
-    main_queue: MainQueue[Item]
-    reporter: Reporter
-    status: Status
+    up: Plan
     run_command: Callable[[Command], None]
     all_or_nothing: bool
 
     def run(self, within_s: float) -> str | None:
         """Bring the system up within a time, or take it over; return why that failed, or None."""
         self._wait_for_processes(within_s)
-        found = self.node_set.other_processes.found_goals()
+        found = self.context.node_set.other_processes.found_goals()
         problem = None
         if found is None:
             problem = self._bring_up(within_s)
         else:
             self._take_over(*found)
-        if problem is None and not self.main_queue.stopping:
-            status = self.status.snapshot()
-            active, nodes = self.node_set.active(), len(self.node_set.nodes)
+        if problem is None and not self.context.main_queue.stopping:
+            status = self.context.status.snapshot()
+            active, nodes = self.context.node_set.active(), len(self.context.node_set.nodes)
             is_complete = not status.failed
-            self.reporter.report(BroughtUp, active, nodes, status.remarks, is_complete)
+            self.context.reporter.report(BroughtUp, active, nodes, status.remarks, is_complete)
         return problem
 
     def _wait_for_processes(self, within_s: float) -> None:
         """Wait until other processes that run already have reported."""
-        processes, queue = self.node_set.other_processes, self.main_queue
+        processes, queue = self.context.node_set.other_processes, self.context.main_queue
         start_s = queue.clock.monotonic()
         while not processes.are_known and not queue.stopping:
             is_certain = processes.is_running_unknown
@@ -86,28 +79,28 @@ class SystemStart:
 
     def _bring_up(self, within_s: float) -> str | None:
         serial = self.supervisor.desired.serial
-        names = (node.name.value for node in self.system.nodes)
+        names = (node.name.value for node in self.context.system.nodes)
         goals = self.up.states_after(dict.fromkeys(names, PrimaryState.UNCONFIGURED))
         if self.all_or_nothing:
-            optional = optional_nodes(self.system)
+            optional = optional_nodes(self.context.system)
             needed = Plan(tuple(step for step in self.up.steps if step.node not in optional))
             failed = self.supervisor.bring_up_together(needed, serial, within_s)
             if failed is not None:
                 return f"{failed.partition(':')[0]} failed"
         problem = self.supervisor.bring_up(goals, self.run_command, serial, within_s)
-        if self.status.without_nodes.activity == "starting":
-            self.status.set_activity("running")
+        if self.context.status.without_nodes.activity == "starting":
+            self.context.status.set_activity("running")
         return problem
 
     def _take_over(self, found: Mapping[str, PrimaryState], activity: str) -> None:
         """Lead the nodes to the goals that they had: those that are there do not move."""
         text = f"an earlier process has coordinated the system, which is {activity}"
-        self.reporter.log(LogLevel.INFO, PROGRAM_LOGGER, text)
+        self.context.reporter.log(LogLevel.INFO, PROGRAM_LOGGER, text)
         serial = self.supervisor.desired.serial
-        self.node_set.take_over()
-        goals = {**start_goals(self.system, PrimaryState.ACTIVE), **found}
+        self.context.node_set.take_over()
+        goals = {**start_goals(self.context.system, PrimaryState.ACTIVE), **found}
         self.supervisor.set_goals(goals, serial, activity)
-        self.status.set_activity(activity)
+        self.context.status.set_activity(activity)
         self.supervisor.reconciler.reconcile_settled("goal under the earlier coordinating process")
 
 
@@ -122,14 +115,9 @@ class SystemEnd:
     """Tears the nodes of a system down and destroys them."""
 
     def __init__(self, down: Plan, supervisor: Supervisor, options: HostOptions) -> None:
-        reconciler = supervisor.reconciler
         self._down = down
         self._supervisor = supervisor
-        self._node_set = reconciler.node_set
-        self._main_queue = reconciler.main_queue
-        self._clock = self._main_queue.clock
-        self._reporter = reconciler.reporter
-        self._status = reconciler.status
+        self._context = supervisor.context
         self._options = options
         self._summary: tuple[NodeSummary, ...] = ()
         self._remarks: tuple[str, ...] = ()
@@ -137,53 +125,53 @@ class SystemEnd:
         self._is_left_to_exit = False  # only the end of the process removes all nodes
         self._has_failed = False
         #: Whether the end of the process removes the nodes faster than their destruction.
-        self.uses_fast_exit = options.ends_process and len(reconciler.system.nodes) > _FEW_NODES
+        self.uses_fast_exit = options.ends_process and len(self._context.system.nodes) > _FEW_NODES
         self.has_left_graph = False
 
     def keep_entities(self) -> None:
         """Leave the entities of the nodes to the end of the process, if that is faster."""
         if self.uses_fast_exit and supports_fast_exit():
-            self._node_set.keep_entities()
+            self._context.node_set.keep_entities()
 
     def tear_down(self, *, is_created: bool) -> None:
         """Lead the nodes down, if all of them were created."""
-        if not self._main_queue.stopping:
-            self._main_queue.request_stop("unrecoverable error")
+        if not self._context.main_queue.stopping:
+            self._context.main_queue.request_stop("unrecoverable error")
         self._has_failed = self._supervisor.has_failed_nodes
-        self._status.set_activity("stopping")
-        remarks = self._status.snapshot().remarks
+        self._context.status.set_activity("stopping")
+        remarks = self._context.status.snapshot().remarks
         # The reason begins with the node that has ended the system, if one has.
         ended_by = self._reason.partition(" ")[0]
         self._remarks = tuple(text for text in remarks if not text.startswith(f"{ended_by} is "))
-        self._reporter.report(Stopping, self._reason)
+        self._context.reporter.report(Stopping, self._reason)
         self.keep_entities()
         stop_within_s = self._options.stop_within_s
-        self._end_s = self._clock.monotonic() + stop_within_s
-        self._node_set.limit_end(self._end_s)
-        self._node_set.other_processes.forget_goals()
+        self._end_s = self._context.clock.monotonic() + stop_within_s
+        self._context.node_set.limit_end(self._end_s)
+        self._context.node_set.other_processes.forget_goals()
         if is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._end_s, limit_s):
                 self._has_failed = True
-        self._summary = self._node_set.summaries()
+        self._summary = self._context.node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
             self._has_failed = True
 
     def destroy(self, shutdown_commands: Iterable[Command]) -> None:
         """Answer the remaining commands and destroy the nodes, as far as there is time."""
-        for item in (*shutdown_commands, *self._main_queue.drain()):
+        for item in (*shutdown_commands, *self._context.main_queue.drain()):
             if isinstance(item, Command):
                 message = f"the system has stopped: {self._reason}"
                 item.answer(item.name == "shutdown", message)
             elif isinstance(item, Fault):
                 self._has_failed = True  # it was not handled
-        self._status.set_activity("stopped")
+        self._context.status.set_activity("stopped")
         end_s = self._end_s
-        if self._main_queue.urgent:
-            end_s = min(end_s, self._clock.monotonic() + _URGENT_S)
-        self._node_set.stop_loops(end_s)
-        self._is_left_to_exit = not self._node_set.destroy(end_s)
-        self._has_failed = self._has_failed or self._node_set.has_unfinished()
+        if self._context.main_queue.urgent:
+            end_s = min(end_s, self._context.clock.monotonic() + _URGENT_S)
+        self._context.node_set.stop_loops(end_s)
+        self._is_left_to_exit = not self._context.node_set.destroy(end_s)
+        self._has_failed = self._has_failed or self._context.node_set.has_unfinished()
 
     def leave_graph(self) -> bool:
         """Leave the ROS graph without destroying what is left of the nodes, if that is possible.
@@ -191,26 +179,26 @@ class SystemEnd:
         Return whether the process has left it.
         """
         # A hung thread may run again and use what the fast exit has destroyed.
-        if self._is_left_to_exit and self._options.ends_process and not self._node_set.hung:
+        if self._is_left_to_exit and self._options.ends_process and not self._context.node_set.hung:
             self.has_left_graph = leave_ros_graph()
         return self.has_left_graph
 
     def outcome(self, *, has_failed: bool) -> Outcome:
         """Return how the run went, which may have failed before its end."""
-        others = self._node_set.other_processes.last_reports
+        others = self._context.node_set.other_processes.last_reports
         of_others = (item for report in others for item in report.callbacks)
         chains = (item for report in others for item in report.chains)
         return Outcome(
             exit_code=1 if has_failed or self._has_failed else 0,
             reason=self._reason,
-            elapsed_s=self._reporter.elapsed_s,
+            elapsed_s=self._context.reporter.elapsed_s,
             nodes=self._summary,
             hung=self._is_left_to_exit,
             remarks=self._remarks,
-            callbacks=(*self._node_set.callbacks(), *of_others),
-            chains=merged_chains(self._node_set.chains(), chains),
+            callbacks=(*self._context.node_set.callbacks(), *of_others),
+            chains=merged_chains(self._context.node_set.chains(), chains),
         )
 
     @property
     def _reason(self) -> str:
-        return self._main_queue.stop_reason or ""
+        return self._context.main_queue.stop_reason or ""

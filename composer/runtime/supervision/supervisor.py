@@ -42,19 +42,14 @@ class Supervisor:
     """The desired state of a system, and the reactions to everything that deviates from it."""
 
     def __init__(self, reconciler: Reconciler) -> None:
-        self._system = reconciler.system
-        self._node_set = reconciler.node_set
-        self._main_queue = reconciler.main_queue
-        self._clock = self._main_queue.clock
-        self._status = reconciler.status
         self.reconciler = reconciler
-        self._shared = reconciler.shared
+        self.context = reconciler.context
         self._faults = FaultHandler(reconciler)
 
     @property
     def desired(self) -> DesiredState:
         """The desired state now."""
-        return self._shared.value
+        return self.context.desired.value
 
     @property
     def has_failed_nodes(self) -> bool:
@@ -64,7 +59,7 @@ class Supervisor:
         """
         conditions = self.desired.conditions
         return any(
-            self._node_set.nodes[name].model.required
+            self.context.node_set.nodes[name].model.required
             for name in self.desired.down
             if conditions.get(name) is not Condition.FINISHED
         )
@@ -92,7 +87,7 @@ class Supervisor:
             kept = desired.forget_failures() if forget_failures else desired
             return kept.with_goals(goals, since, activity)
 
-        self._shared.update(change)
+        self.context.desired.update(change)
         self.reconciler.publish_desired()
 
     def bring_up(
@@ -108,21 +103,21 @@ class Supervisor:
         nodes are up or their failures are handled, and if the system stops: a failure may have
         ended it.
         """
-        end_s = self._clock.monotonic() + within_s
-        self._faults.before = self._node_set.states(), since
+        end_s = self.context.clock.monotonic() + within_s
+        self._faults.before = self.context.node_set.states(), since
         self.set_goals(goals, since, "running")
         self.reconciler.reconcile_settled("bring-up", end_s)
         self.run(run_command, end_s, until=lambda: self.reconciler.is_settled)
         desired, reason = self.desired, ""
         if not self.reconciler.is_settled:
             reason = f"bring-up timed out after {within_s:g} s"
-        elif is_nothing_left(self._system, desired):
+        elif is_nothing_left(self.context.system, desired):
             reason = next(iter(desired.down.values()))
         before, self._faults.before = self._faults.before, None
-        if self._main_queue.stopping or not reason:
+        if self.context.main_queue.stopping or not reason:
             return None
         failed = (*desired.down, *desired.unhandled, *self.reconciler.moving)
-        names = (self._node_set.nodes[name].full_name for name in failed)
+        names = (self.context.full_name(name) for name in failed)
         name = next(names, "the system")
         self.reconciler.roll_back(*before, name, reason)
         return f"{name} failed"
@@ -136,14 +131,14 @@ class Supervisor:
 
         ``since`` is the serial number of the desired state that the plan is based on.
         """
-        before = self._node_set.states()
-        end_s = self._clock.monotonic() + within_s
+        before = self.context.node_set.states()
+        end_s = self.context.clock.monotonic() + within_s
         options = ExecutionOptions(end_s=end_s, serial=since)
         failures = self.reconciler.execute(plan, options)
         if not failures:
             return None
         step, reason = failures[0].step, failures[0].text
-        if self._clock.monotonic() >= end_s:
+        if self.context.clock.monotonic() >= end_s:
             reason = f"{step.transition} failed: bring-up timed out after {within_s:g} s"
         self.reconciler.roll_back(before, since, step.full_name, reason)
         return f"{step.full_name}: {reason}"
@@ -157,13 +152,13 @@ class Supervisor:
         lowered = desired
         for name in names:
             lowered = lowered.fail(Fault(name, FaultKind.STEP, cause, lowered.serial))
-        plan = reconcile(self._system, lowered, self._node_set.states(), cause)
+        plan = reconcile(self.context.system, lowered, self.context.node_set.states(), cause)
         options = ExecutionOptions(best_effort=True, serial=desired.serial)
         return self.reconciler.execute(plan, options)
 
     def release(self, names: Iterable[str]) -> None:
         """Forget the failures of nodes and their restarts."""
-        self._shared.update(partial(DesiredState.forget_failures, nodes=tuple(names)))
+        self.context.desired.update(partial(DesiredState.forget_failures, nodes=tuple(names)))
 
     def tear_down(self, plan: Plan, end_s: float, step_limit_s: float) -> bool:
         """Execute a plan as far as possible; return whether nothing failed."""
@@ -184,18 +179,20 @@ class Supervisor:
 
         Without ``run_command``, the first command in the queue also ends the run.
         """
-        while not (self._main_queue.stopping or self._clock.monotonic() >= end_s or until()):
-            now_s = self._clock.monotonic()
+        while not (
+            self.context.main_queue.stopping or self.context.clock.monotonic() >= end_s or until()
+        ):
+            now_s = self.context.clock.monotonic()
             due = [item for item in self.desired.scheduled.values() if item.due_s <= now_s]
             if due:
                 self.restart(due)
                 continue
             restart = self.desired.next_restart
             due_s = math.inf if restart is None else restart.due_s
-            item = self._main_queue.get(min(end_s, due_s))
+            item = self.context.main_queue.get(min(end_s, due_s))
             if isinstance(item, Command):
                 if run_command is None:
-                    self._main_queue.put_back(item)
+                    self.context.main_queue.put_back(item)
                     return
                 run_command(item)
             elif item is not None:
@@ -205,9 +202,9 @@ class Supervisor:
         """Handle an event, and events of its kind that follow: many nodes may fail at once."""
         match event:
             case Fault() as fault:
-                self._faults.handle([fault, *self._main_queue.take_next(Fault)])
+                self._faults.handle([fault, *self.context.main_queue.take_next(Fault)])
             case NodeMoved() as moved:
-                self._on_moved([moved, *self._main_queue.take_next(NodeMoved)])
+                self._on_moved([moved, *self.context.main_queue.take_next(NodeMoved)])
             case StepEnded(node=name):
                 self.reconciler.end_step(name)
             case LoopRecovered() as recovered:
@@ -227,22 +224,22 @@ class Supervisor:
             name, serial = restart.node, self.desired.serial
             if self.desired.scheduled.get(name) != restart:
                 continue
-            self._shared.update(
-                partial(DesiredState.restart, node=name, at_s=self._clock.monotonic())
+            self.context.desired.update(
+                partial(DesiredState.restart, node=name, at_s=self.context.clock.monotonic())
             )
-            self._status.count_restart(name)
-            problem = self._node_set.recreate(name, partial(self.has_moved, name, serial))
+            self.context.status.count_restart(name)
+            problem = self.context.node_set.recreate(name, partial(self.has_moved, name, serial))
             if problem is not None:
                 self._faults.handle(
                     [Fault(name, FaultKind.TRANSITION, problem, self.desired.serial)]
                 )
                 continue
             self.reconciler.note_restart(name, restart.attempt)
-            texts.append(f"restart {restart.attempt} of {self._node_set.nodes[name].full_name}")
+            texts.append(f"restart {restart.attempt} of {self.context.full_name(name)}")
         if texts:
             self.reconciler.reconcile_settled(", ".join(texts))
 
     def _on_returned(self, name: str) -> None:
         """Bring a node up again that was not there, or not as expected, and what depends on it."""
-        self._shared.update(partial(DesiredState.release, node=name))
-        self.reconciler.reconcile_settled(f"{self._node_set.nodes[name].full_name} is there again")
+        self.context.desired.update(partial(DesiredState.release, node=name))
+        self.reconciler.reconcile_settled(f"{self.context.full_name(name)} is there again")

@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 
 from composer.runtime.clock.clock import COMPUTER
-from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.health_monitor import HealthMonitor, _ObservedCallback
-from composer.runtime.supervision.main_queue import SharedDesiredState
 
 
 @pytest.mark.parametrize(
@@ -19,9 +17,9 @@ from composer.runtime.supervision.main_queue import SharedDesiredState
 )
 def test_a_late_check_counts_at_most_as_two(passed_s: float, counted_s: float) -> None:
     """Otherwise every callback would hang after a pause of the computer."""
-    node_set: Any = SimpleNamespace(nodes={}, loops={}, hung=set())
-    reporter = Reporter(None, COMPUTER)
-    monitor = HealthMonitor(node_set, SharedDesiredState(), print, reporter, COMPUTER)
+    node_set = SimpleNamespace(nodes={}, loops={}, hung=set())
+    context: Any = SimpleNamespace(node_set=node_set, clock=COMPUTER)
+    monitor = HealthMonitor(context)
     assert monitor._period_s == 1.0
     now_s = time.monotonic()
     monitor._forgive_delay(now_s)
