@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.model import Node
-from composer.python_code.checker import RunningCheck, start
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import use_of
 from composer.python_code.problems import Family, Problem
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.subjects import earlier_errors
 from composer.rules.python import diagnostic, sources
+
+if TYPE_CHECKING:
+    from composer.python_code.checker.check import RunningCheck
 
 #: What the type checker needs to know of the use of a class; equal uses are checked once.
 _Use: TypeAlias = tuple[object, ...]
@@ -39,6 +41,8 @@ class TypeCheck:
     @classmethod
     def of(cls, contexts: Sequence[Context]) -> TypeCheck:
         """Start to check the Python code of the systems."""
+        from composer.python_code.checker.check import start_checks  # noqa: PLC0415 - slow
+
         by_interfaces: dict[int, tuple[Interfaces, dict[_Use, tuple[Node, BehaviorSource]]]] = {}
         for context in contexts:
             key = id(context.interfaces)
@@ -47,7 +51,7 @@ class TypeCheck:
                 classes.setdefault(use_of(node, source), (node, source))
         return cls(
             [
-                start(tuple(classes.values()), interfaces)
+                start_checks(tuple(classes.values()), interfaces)
                 for interfaces, classes in by_interfaces.values()
                 if classes
             ]

@@ -1,27 +1,31 @@
-"""One run of the type checker over a set of files, and the findings that matter."""
+"""Runs of the type checker over sets of files, and the findings that matter."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
 from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Interfaces
+from composer.model import Node
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.copies import Copy, edited_copy
-from composer.python_code.checker.file_sets import FileSet
+from composer.python_code.checker.file_sets import FileSet, file_sets
 from composer.python_code.checker.findings import MISSING_RETURN, SYNTAX_KINDS, Reader
 from composer.python_code.checker.owners import Owners
-from composer.python_code.checker.pyrefly import Finding, Process, start_process
+from composer.python_code.checker.pyrefly import Finding, Run, start
 from composer.python_code.checker.relevance import Relevance, reassigned
-from composer.python_code.lookup import BrokenModule
-from composer.python_code.problems import Family, Problem
+from composer.python_code.lookup import BehaviorSource, BrokenModule
+from composer.python_code.problems import CheckerFailed, Family, Problem
 
 #: Findings in one file that are read, as each costs time. A real file has a few.
 MAX_FINDINGS = 500
+#: Checks that run side by side, and the most for one command.
+_PARALLEL = 2
+_MAXIMUM = 50
 _TOO_MANY = f"the type checker reports more than {MAX_FINDINGS} places; the rest is not shown"
 
 
@@ -29,16 +33,17 @@ _TOO_MANY = f"the type checker reports more than {MAX_FINDINGS} places; the rest
 class Check:
     """A check that runs in the background."""
 
-    _files: FileSet
+    files: FileSet
     _interfaces: Interfaces
     _copies: Mapping[str, Copy]
-    _process: Process
+    _stubs: Mapping[str, str]
+    _run: Run
     _unread: list[tuple[str, Span]] = field(default_factory=list)  # first places after the limit
 
     @classmethod
-    def start(cls, files: FileSet, stubs: Mapping[str, str], interfaces: Interfaces) -> Check:
+    def start(cls, files: FileSet, interfaces: Interfaces) -> Check:
         """Start to check files with their stubs. Raises CheckerFailed."""
-        copies, texts = {}, {}
+        copies, texts, stubs = {}, {}, files.stubs(interfaces)
         for name, file in files.files.items():
             texts[name] = file.text.text
             if not isinstance(file.content, BrokenModule):
@@ -46,27 +51,28 @@ class Check:
                 is_behavior = file.node.behavior is not None
                 copies[name] = edited_copy(file.content, edits, is_behavior=is_behavior)
                 texts[name] = copies[name].text
-        process = start_process({**texts, **stubs}, texts, files.search_paths())
-        return cls(files, interfaces, copies, process)
+        run = start({**texts, **stubs}, texts, files.search_paths())
+        return cls(files, interfaces, copies, stubs, run)
 
     def close(self) -> None:
         """End the check."""
-        self._process.close()
+        self._run.close()
 
     def problems(self) -> list[tuple[str, Problem]]:
         """Wait for the problems, each with the name of its file. Raises CheckerFailed.
 
         A line has one report of each family, and a file one of each message.
         """
-        findings = self._process.findings()
-        owners = Owners(self._files.behaviors, self._interfaces)
+        findings = self._run.findings()
+        owners = Owners(self.files.behaviors, self._stubs)
         found = list(self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS}))
         seen: set[tuple[object, ...]] = set()
         wrong_imports: dict[str, list[str]] = {}
         for finding, span, code, relevance in self._relevant(findings, owners):
             path = finding.path
-            source = self._files.files[path].source
-            problem = Reader(finding, source, code, relevance, owners, span).problem()
+            source = self.files.files[path].source
+            reader = Reader(finding, source, code, relevance, owners, self._interfaces, span)
+            problem = reader.problem()
             if problem is None:
                 continue
             keys: set[tuple[object, ...]] = {(path, problem.span.line, problem.family)}
@@ -86,7 +92,7 @@ class Check:
 
     def _syntax_problems(self, refused: set[str]) -> Iterator[tuple[str, Problem]]:
         """Yield the files that Python cannot parse, those that the checker can parse as info."""
-        for name, file in self._files.files.items():
+        for name, file in self.files.files.items():
             if not isinstance(file.content, BrokenModule):
                 continue
             problem = Problem(Family.SYNTAX, file.content.message, file.content.span)
@@ -115,12 +121,12 @@ class Check:
             del in_file[MAX_FINDINGS:]
         codes = {path: CodeIndex(self._copies[path].module) for path in by_path}
         attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
-        classes = frozenset(name for module in self._files.modules for name in module.classes)
+        classes = frozenset(name for module in self.files.modules for name in module.classes)
         for path, in_file in by_path.items():
             changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
             relevance = Relevance(
                 codes[path],
-                is_class=self._files.files[path].node.behavior is None,
+                is_class=self.files.files[path].node.behavior is None,
                 reassigned=reassigned(codes[path], changed),
                 attributes=attributes,
                 classes=classes,
@@ -129,6 +135,69 @@ class Check:
             for finding, span in in_file:
                 if relevance.keeps(finding, span):
                     yield finding, span, codes[path], relevance
+
+
+@dataclass(slots=True)
+class RunningCheck:
+    """The checks of the classes of a project, some of them running in the background."""
+
+    interfaces: Interfaces
+    waiting: list[FileSet]
+    running: list[Check] = field(default_factory=list)
+    found: list[tuple[Node, BehaviorSource, Problem]] = field(default_factory=list)
+    has_failed: bool = False
+
+    def fill(self) -> None:
+        """Start as many checks as may run side by side."""
+        while self.waiting and len(self.running) < _PARALLEL:
+            files = self.waiting.pop(0)
+            try:
+                self.running.append(Check.start(files, self.interfaces))
+            except CheckerFailed as error:
+                self._add_failure(files, error)
+                self.waiting.clear()  # the next one would fail as well
+
+    def problems(self) -> list[tuple[Node, BehaviorSource, Problem]]:
+        """Wait for all checks, and return what they found, each with the node it is about."""
+        while self.running:
+            check = self.running.pop(0)
+            try:
+                self._add(check.files, check.problems())
+            except CheckerFailed as error:
+                self._add_failure(check.files, error)
+            self.fill()
+        return self.found
+
+    def close(self) -> None:
+        """End all checks."""
+        self.waiting.clear()
+        for check in self.running:
+            check.close()
+
+    def _add(self, files: FileSet, found: Iterable[tuple[str, Problem]]) -> None:
+        for name, problem in found:
+            self.found.append((files.files[name].node, files.files[name].source, problem))
+
+    def _add_failure(self, files: FileSet, error: CheckerFailed) -> None:
+        """Report once that the checker does not work, and what is wrong without it."""
+        for name, file in files.files.items():
+            if isinstance(file.content, BrokenModule):
+                problem = Problem(Family.SYNTAX, file.content.message, file.content.span)
+                self._add(files, [(name, problem)])
+            elif not self.has_failed:
+                self.has_failed = True
+                message = f"the type checker did not check the Python code: {error}"
+                problem = Problem(Family.NOT_CHECKED, message, Span(file.text, 1, 1))
+                self._add(files, [(name, problem)])
+
+
+def start_checks(
+    classes: Sequence[tuple[Node, BehaviorSource]], interfaces: Interfaces
+) -> RunningCheck:
+    """Start to check the classes of nodes; ``problems`` waits for what they find."""
+    check = RunningCheck(interfaces, file_sets(classes, interfaces)[:_MAXIMUM])
+    check.fill()
+    return check
 
 
 def _is_meant(name: str, wrong: Collection[str]) -> bool:

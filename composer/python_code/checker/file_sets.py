@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
@@ -125,21 +124,6 @@ class FileSet:
         contents = (file.content for file in self.files.values())
         yield from (item for item in contents if isinstance(item, Module))
 
-    def state(self, stubs: Mapping[str, str]) -> Iterator[str]:
-        """Yield all that the findings depend on: texts, uses, packages and our own code."""
-        yield f"{sys.version_info} {self.search_paths()}"
-        for name, file in self.files.items():
-            edits = self.edits.get(file.content.path, {})
-            bases = [(class_, edit.base) for class_, edit in edits.items()]
-            yield f"{name} {file.node.name} {file.node.behavior is None} {bases}"
-            yield file.text.text
-        for name, text in stubs.items():
-            yield name
-            yield text
-        own = (*Path(__file__).parents[1].rglob("*.py"), *LIBRARIES.rglob("*.pyi"))
-        for path in (*map(Path, package_folders()), *sorted(own)):
-            yield f"{path} {path.stat().st_mtime_ns}"
-
     def stubs(self, interfaces: Interfaces) -> dict[str, str]:
         """Return the stubs that the files need, by their names below the folder of the check."""
         texts = [module.source.text for module in self.modules]
@@ -183,11 +167,6 @@ def file_sets(
             sets.append(fitting)
         fitting.add(node, source, interfaces)
     return sets
-
-
-def package_folders() -> list[str]:
-    """Return the folders of installed packages."""
-    return [path for path in sys.path if path.endswith("-packages") and Path(path).is_dir()]
 
 
 def _unused_name(node: Node, taken: Mapping[str, Node]) -> str:

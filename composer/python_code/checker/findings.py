@@ -14,9 +14,10 @@ from collections.abc import Iterable
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
+from composer.interfaces import Interfaces
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
-from composer.python_code.checker.owners import Owners, public_names
+from composer.python_code.checker.owners import Owner, Owners, public_names
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.checker.relevance import Relevance, is_parameter, unguarded_value
 from composer.python_code.lookup import BehaviorSource
@@ -88,6 +89,7 @@ class Reader:
     code: CodeIndex
     relevance: Relevance
     owners: Owners
+    interfaces: Interfaces
     span: Span
 
     @property
@@ -117,7 +119,7 @@ class Reader:
         node = self.code.import_at(self.span.line)
         if node is None:
             return None
-        imports = Imports(self.code.module, self.source, self.owners.interfaces)
+        imports = Imports(self.code.module, self.source, self.interfaces)
         found = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
         wanted = found["imported"] if found is not None else node.names[0].name
         if isinstance(node, ast.Import):
@@ -177,7 +179,7 @@ class Reader:
         if found["imported"] and not is_known:
             return self._import()
         own = {item.path.stem for item in self.source.own_modules}
-        if not (is_known or top in self.owners.interfaces.packages() or module in own):
+        if not (is_known or top in self.interfaces.packages() or module in own):
             return None  # part of it may be compiled
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
@@ -212,10 +214,10 @@ class Reader:
             rf"Unexpected keyword argument `(\w+)` in function `{_OF_MESSAGE}`",
             self.finding.message,
         )
-        owner = self.owners.message("/".join(called.group(2, 3, 4))) if called else None
-        if called is None or owner is None:
+        if called is None:
             return self._in_its_words()
-        return self._in_its_words(owner.family, owner.hint(called[1]))
+        members = self.owners.messages[called[4]][f"{called[2]}.{called[3]}"]
+        return self._in_its_words(Family.FIELD, Owner(Family.FIELD, members).hint(called[1]))
 
     def _name(self) -> Problem | None:
         found = re.search(_NAME, self.finding.message)

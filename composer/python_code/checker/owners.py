@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
 
 from composer import behavior
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
-from composer.interfaces import Interfaces
-from composer.interfaces.definitions import parts
-from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family
@@ -20,7 +18,9 @@ from composer.python_code.syntax import Module
 
 #: Names of ROS 1, with what ROS 2 has instead.
 _ROS_1_NAMES = {"nsec": "nanosec", "nsecs": "nanosec", "secs": "sec"}
-_PARTS = {"msg": (), "srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
+#: A class in the stub of a package, and the names in its body.
+_CLASS = re.compile(r"^class (\w+)\b.*\n((?: .*\n)*)", re.MULTILINE)
+_MEMBER = re.compile(r"^    (?:def )?(?!def )([A-Za-z]\w*)", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,72 +43,53 @@ class Owner:
 
 
 class Owners:
-    """Looks up the classes that a check may name."""
+    """Looks up the classes that a check may name; ``stubs`` are those of its interfaces."""
 
-    def __init__(self, behaviors: Mapping[str, Node], interfaces: Interfaces) -> None:
-        self.interfaces = interfaces
+    def __init__(self, behaviors: Mapping[str, Node], stubs: Mapping[str, str]) -> None:
         self._behaviors = behaviors
+        self._stubs = stubs
 
     def named(self, name: str, module: Module, *, with_api: bool) -> Owner | None:
         """Return the owner with the short name of a class, None for classes of others.
 
-        Names of the API for behaviors are also names of rclpy, and ``Clock`` is one of a message.
-        A message is looked for first in the packages that the module or a port uses.
+        rclpy and the API for behaviors have classes with the names of messages.
         """
         if name in self._groups:
             return self._groups[name]
         is_of_api = with_api and name in API_CLASSES
-        used = self._used_packages(module)
-        known = self.messages.get(name, ())
-        full_names = sorted(known, key=lambda full: _package(full) not in used)
+        is_ambiguous = is_of_api or name == "Parameter"
         imported = module.imports.get(name)
-        is_of_rclpy = name == "Parameter" and (imported is None or imported.module[:5] == "rclpy")
-        is_message = bool(full_names) and not is_of_rclpy
-        if is_message and (_package(full_names[0]) in used or not is_of_api):
-            return self.message(full_names[0])
+        homes = self.messages.get(name, {})
+        if imported is not None or is_ambiguous:
+            homes = {home: homes[home] for home in homes if imported and home == imported.module}
+        for members in homes.values():
+            return Owner(Family.FIELD, members)
         return Owner(Family.PORT, public_names(name), is_api=True) if is_of_api else None
-
-    def message(self, name: str) -> Owner | None:
-        """Return a message, or a part of a service or action, by its full name."""
-        definition = self.interfaces.message(name)
-        base, _, part = name.rpartition("_")
-        whole = self.interfaces.find(base) if definition is None and base else None
-        if whole is not None:
-            definition = parts(whole).get(part.lower())
-        if definition is None:
-            members = _PARTS[name.split("/")[1]]
-            return Owner(Family.FIELD, members) if members else None
-        constants = (constant.name for constant in definition.constants)
-        return Owner(Family.FIELD, (*definition.field_names, *constants))
-
-    def _used_packages(self, module: Module) -> set[str]:
-        """Return the packages that the module imports or that types of ports belong to."""
-        ports = (port for node in self._behaviors.values() for port in node.ports)
-        imported = {item.module.partition(".")[0] for item in module.imports.values()}
-        return imported | {_package(port.interface.value) for port in ports}
 
     @cached_property
     def _groups(self) -> dict[str, Owner]:
         """The generated classes with ports and parameters, by name."""
         groups = {}
         for base, node in self._behaviors.items():
-            for attribute, kind in PORT_ATTRIBUTES.items():
-                names = (port.name.value for port in node.ports_of(kind))
-                groups[member_class_name(base, attribute)] = _group(node, names)
-            names = (parameter.name.value for parameter in node.parameters)
-            groups[member_class_name(base, "parameters")] = _group(node, names)
+            members = {
+                attribute: [port.name.value for port in node.ports_of(kind)]
+                for attribute, kind in PORT_ATTRIBUTES.items()
+            }
+            members["parameters"] = [item.name.value for item in node.parameters]
+            homes = {name: attribute for attribute, names in members.items() for name in names}
+            for attribute, names in members.items():
+                known = tuple(filter(str.isidentifier, names))
+                groups[member_class_name(base, attribute)] = Owner(Family.PORT, known, homes)
         return groups
 
     @cached_property
-    def messages(self) -> dict[str, list[str]]:
-        """The full names of messages and of parts, by the names of their classes."""
-        found: dict[str, list[str]] = {}
-        for folder in FOLDERS:
-            for name in self.interfaces.names(folder):
-                short = name.rpartition("/")[2]
-                found.setdefault(short, []).append(name)
-                for part in _PARTS[folder]:
-                    found.setdefault(f"{short}_{part}", []).append(f"{name}_{part}")
+    def messages(self) -> dict[str, dict[str, tuple[str, ...]]]:
+        """The members of messages and of parts, by the name of their class and its module."""
+        found: dict[str, dict[str, tuple[str, ...]]] = {}
+        for path, text in self._stubs.items():
+            home = ".".join(path.removesuffix(".pyi").split("/")[-2:])
+            for name, body in _CLASS.findall(text) if not home.startswith("composer.") else ():
+                found.setdefault(name, {})[home] = tuple(dict.fromkeys(_MEMBER.findall(body)))
         return found
 
 
@@ -116,18 +97,3 @@ def public_names(class_name: str) -> tuple[str, ...]:
     """Return the attributes of a class of the API for behaviors."""
     names = dir(getattr(behavior, class_name))
     return tuple(name for name in names if not name.startswith("_"))
-
-
-def _package(interface: str) -> str:
-    return interface.partition("/")[0]
-
-
-def _group(node: Node, names: Iterable[str]) -> Owner:
-    members = tuple(name for name in names if name.isidentifier())
-    elsewhere = {
-        port.name.value: attribute
-        for attribute, kind in PORT_ATTRIBUTES.items()
-        for port in node.ports_of(kind)
-    }
-    elsewhere |= {item.name.value: "parameters" for item in node.parameters}
-    return Owner(Family.PORT, members, elsewhere)

@@ -13,7 +13,7 @@ from collections.abc import Container, Iterable
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.python_code.checker.code_index import CodeIndex, targets_of
+from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.pyrefly import Finding
 from composer.python_code.trees import dotted, is_none, last_name
 
@@ -141,9 +141,9 @@ class Relevance:
 
 def reassigned(code: CodeIndex, lines: Iterable[int]) -> frozenset[str]:
     """Return the names and own attributes that get values of several types in ``lines``."""
-    nodes = (code.assignment_at(line) for line in lines)
-    targets = (target for node in nodes if node is not None for target in targets_of(node))
-    names = (dotted(target).removeprefix("self.") for target in targets)
+    nodes = filter(None, (code.assignment_at(line) for line in lines))
+    targets = (x for node in nodes for x in ast.walk(node) if hasattr(x, "ctx"))
+    names = (dotted(x).removeprefix("self.") for x in targets if isinstance(x.ctx, ast.Store))
     return frozenset(name for name in names if name and "." not in name)
 
 

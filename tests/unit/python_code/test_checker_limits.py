@@ -51,7 +51,8 @@ def test_checker_that_fails_is_a_note(
     program.write_text(f"#!{sys.executable}\nimport os, signal, sys, time\n{code}\n")
     program.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
-    monkeypatch.setattr(pyrefly, "TIME_LIMIT_S", 2.0)
+    if "took longer" in reason:  # the others end by themselves
+        monkeypatch.setattr(pyrefly, "TIME_LIMIT_S", 2.0)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "code.py").write_text(CODE % name)
     found = diagnostics_in(SYSTEM, tmp_path)
