@@ -8,8 +8,7 @@ from itertools import pairwise
 
 from composer.base.diagnostics import Diagnostic, Label, suggestion
 from composer.base.source import Located, Span
-from composer.interfaces import Action as ActionDefinition
-from composer.interfaces import Message, Service
+from composer.interfaces import Message
 from composer.interfaces.field_types.checker import FieldChecker
 from composer.interfaces.field_types.types import NUMBER, STATUS, Problem, ValueType
 from composer.language.expressions import Expression
@@ -238,7 +237,7 @@ def check_values(context: Context) -> Iterator[Diagnostic]:
         kind = action.verb.channel
         channel = None if kind is None else channels.get((kind, action.name.value))
         if channel is not None and action.content is not None:
-            sent, scope = _sent(context, channel), _NOW
+            sent, scope = context.sent(channel.ends[0].port), _NOW
             if action.verb is Verb.CORRUPT and sent is not None:
                 scope = {"message": sent, **_NOW}
             yield from _template(context, action.content, sent, scope)
@@ -260,30 +259,13 @@ _NOW: dict[str, ValueType] = {"now": NUMBER}
 _STATUS = replace(STATUS, words=(*STATUS.words, "rejected"))
 
 
-def _sent(context: Context, channel: Channel) -> Message | None:
-    """Return the message, request or goal of a channel."""
-    match context.interface(channel.ends[0].port):
-        case Message() as message:
-            return message
-        case Service(request=request):
-            return request
-        case ActionDefinition(goal=goal):
-            return goal
-    return None
-
-
 def _event(context: Context, event: Condition, channel: Channel) -> Iterator[Diagnostic]:
-    received: Message
-    scope = dict(_NOW)
-    match context.interface(channel.ends[0].port):
-        case Message() as received:
-            scope["message"] = received
-        case Service(response=received):
-            scope["response"] = received
-        case ActionDefinition(result=received):
-            scope |= {"result": received, "status": _STATUS}
-        case _:
-            return
+    messages = context.messages(channel.ends[0].port)
+    part = next((name for name in ("message", "response", "result") if name in messages), None)
+    if part is None:
+        return
+    received = messages[part]
+    scope = {**_NOW, part: received, **({"status": _STATUS} if part == "result" else {})}
     if event.where is not None:
         where, span = event.where.value, event.where.span
         names = list(_names(where, span, scope))

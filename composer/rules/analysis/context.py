@@ -12,6 +12,7 @@ from composer.base.diagnostics import Diagnostic, Severity
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
+from composer.interfaces.definitions import parts
 from composer.language.document.limits import MAX_FINDINGS
 from composer.language.expressions import Expression, FieldPath
 from composer.language.rules import TOO_LARGE
@@ -70,6 +71,15 @@ class Context:
         """Return the definition of a port's type; None if it is unknown or of another kind."""
         found = self.interfaces.find(port.interface.value)
         return found if isinstance(found, _DEFINITIONS[port.kind.channel]) else None
+
+    def messages(self, port: Port | None) -> dict[str, Message]:
+        """Return the messages of a port's type, by ``message``, ``goal`` and so on, if known."""
+        found = self.interface(port) if port is not None else None
+        return parts(found) if found is not None else {}
+
+    def sent(self, port: Port | None) -> Message | None:
+        """Return the message, request or goal of a port's type; None if it is unknown."""
+        return next(iter(self.messages(port).values()), None)
 
 
 Check: TypeAlias = Callable[[Context], Iterator[Diagnostic]]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.interfaces import Action, Message, Service
+from composer.interfaces import Message
 from composer.language.expressions import Expression
 from composer.language.templates import Template, expressions_in
 from composer.model import Event, Node, Port, PortKind, Reaction, Send, System
@@ -49,37 +49,30 @@ def message_templates(context: Context) -> Iterator[tuple[Template, Message]]:
     """Yield the templates of all messages, requests, responses, feedback and results."""
     for site in reactions(context.system):
         for send in (*site.reaction.publish, *site.reaction.call):
-            message = _sent(context, site.node.port(send.port.value))
+            message = context.sent(site.node.port(send.port.value))
             if message is not None:
                 yield send.content, message
-        definition = context.interface(site.port) if site.port is not None else None
-        if site.reaction.respond is not None and isinstance(definition, Service):
-            yield site.reaction.respond, definition.response
+        response = context.messages(site.port).get("response")
+        if site.reaction.respond is not None and response is not None:
+            yield site.reaction.respond, response
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.ACTION_SERVER):
             yield from _goal_templates(context, port)
 
 
-def _sent(context: Context, port: Port | None) -> Message | None:
-    match context.interface(port) if port is not None else None:
-        case Message() as message:
-            return message
-        case Service() as service:
-            return service.request
-        case Action() as action:
-            return action.goal
-        case _:
-            return None
-
-
 def _goal_templates(context: Context, port: Port) -> Iterator[tuple[Template, Message]]:
-    action = context.interface(port)
-    if not isinstance(action, Action):
-        return
+    messages = context.messages(port)
+    for content, part in contents_of_goal(port):
+        if part in messages:
+            yield content, messages[part]
+
+
+def contents_of_goal(port: Port) -> Iterator[tuple[Template, str]]:
+    """Yield what an action server sends, with ``feedback`` or ``result``."""
     if port.feedback is not None and port.feedback.content is not None:
-        yield port.feedback.content, action.feedback
+        yield port.feedback.content, "feedback"
     if port.result is not None:
-        yield port.result, action.result
+        yield port.result, "result"
 
 
 #: Names that every reaction can use.

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.interfaces import Action, Message, Service
+from composer.interfaces import Message
 from composer.interfaces.field_types.checker import FieldChecker
 from composer.interfaces.field_types.constants import constant_problem
 from composer.interfaces.field_types.types import (
@@ -30,7 +30,13 @@ from composer.language.templates import Constant, Items, Template
 from composer.language.tree import Plain
 from composer.model import Event, Node, Parameter, PeriodError, Port, Reaction, Timer
 from composer.rules.analysis.context import Context
-from composer.rules.analysis.expressions import COMMON_NAMES, EVENT_NAMES, ReactionSite, reactions
+from composer.rules.analysis.expressions import (
+    COMMON_NAMES,
+    EVENT_NAMES,
+    ReactionSite,
+    contents_of_goal,
+    reactions,
+)
 from composer.rules.analysis.parameters import has_wrong_default, wrong_choices
 
 
@@ -131,21 +137,10 @@ def _choices(parameter: Parameter) -> tuple[Plain, ...]:
 
 def _scope(context: Context, names: _NameTypes, event: Event, port: Port | None) -> _NameTypes:
     scope = _NameTypes(names)
-    definition = context.interface(port) if port is not None else None
+    known: dict[str, ValueType] = {"status": STATUS, "failure": STRING, **context.messages(port)}
     for name in EVENT_NAMES.get(event, ()):
-        scope[name] = _type_of_name(name, definition)
+        scope[name] = known.get(name, ANYTHING)
     return scope
-
-
-def _type_of_name(name: str, definition: Message | Service | Action | None) -> ValueType:
-    if name == "status":
-        return STATUS
-    if name == "failure":
-        return STRING
-    if isinstance(definition, Message):
-        return definition
-    found = getattr(definition, name, None)  # request, response, goal, feedback, result
-    return found if isinstance(found, Message) else ANYTHING
 
 
 def _reaction(
@@ -160,11 +155,8 @@ def _reaction(
     if reaction.log is not None:
         yield from checker.text(reaction.log)
     if reaction.respond is not None:
-        definition = context.interface(site.port) if site.port is not None else None
-        if isinstance(definition, Service):
-            yield from checker.template(reaction.respond, definition.response)
-        else:
-            yield from checker.text(reaction.respond)
+        response = context.messages(site.port).get("response")
+        yield from _filled(checker, reaction.respond, response)
 
 
 def _state(content: Template, initial: ValueType, checker: FieldChecker) -> Iterator[Problem]:
@@ -194,34 +186,18 @@ def _sends(
 ) -> Iterator[FieldProblem]:
     for send in (*reaction.publish, *reaction.call):
         at = (node.name.value, send.port.value)
-        for problem in _sent(context, checker, node.port(send.port.value), send.content):
+        message = context.sent(node.port(send.port.value))
+        for problem in _filled(checker, send.content, message):
             yield FieldProblem(problem, at)
 
 
-def _sent(
-    context: Context, checker: FieldChecker, port: Port | None, content: Template
-) -> Iterator[Problem]:
-    match context.interface(port) if port is not None else None:
-        case Message() as message:
-            yield from checker.template(content, message)
-        case Service() as service:
-            yield from checker.template(content, service.request)
-        case Action() as action:
-            yield from checker.template(content, action.goal)
-        case None:
-            yield from checker.text(content)
+def _filled(checker: FieldChecker, content: Template, message: Message | None) -> Iterator[Problem]:
+    return checker.text(content) if message is None else checker.template(content, message)
 
 
 def _action_server(context: Context, checker: FieldChecker, port: Port) -> Iterator[Problem]:
     if port.accept is not None:
         yield from checker.condition(port.accept, port.accept_span or port.span)
-    action = context.interface(port)
-    steps = port.feedback.content if port.feedback is not None else None
-    parts = ((steps, "feedback"), (port.result, "result"))
-    for content, part in parts:
-        if content is None:
-            continue
-        if isinstance(action, Action):
-            yield from checker.template(content, getattr(action, part))
-        else:
-            yield from checker.text(content)
+    messages = context.messages(port)
+    for content, part in contents_of_goal(port):
+        yield from _filled(checker, content, messages.get(part))
