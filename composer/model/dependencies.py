@@ -19,6 +19,11 @@ class PortOfNode:
     node: Node
     port: Port
 
+    @property
+    def key(self) -> tuple[str, str]:
+        """The names of the node and of the port."""
+        return self.node.name.value, self.port.name.value
+
 
 @dataclass(frozen=True, slots=True)
 class Channel:

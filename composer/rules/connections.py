@@ -68,7 +68,7 @@ def unconnected_ports(context: Context, kind: PortKind) -> Iterator[PortOfNode]:
             port = endpoint.port
             if port.kind is not kind or port.external or port.required is False:
                 continue
-            if not (is_source and _key(endpoint) in connected):
+            if not (is_source and endpoint.key in connected):
                 yield endpoint
 
 
@@ -135,10 +135,6 @@ def _names_of_affected(context: Context) -> frozenset[str]:
     return frozenset(names)
 
 
-def _key(endpoint: PortOfNode) -> tuple[str, str]:
-    return endpoint.node.name.value, endpoint.port.name.value
-
-
 def nearest_channel(context: Context, endpoint: PortOfNode) -> str | None:
     """Return a hint with the most similar name of a possible counterpart, or None."""
     name = _nearest_name(context, endpoint)
@@ -151,7 +147,7 @@ def _nearest_name(context: Context, endpoint: PortOfNode) -> str | None:
     Names are searched for the first ports only, since each search takes about a millisecond.
     """
     searched = context.once(_nearest_names)
-    key = _key(endpoint)
+    key = endpoint.key
     if key not in searched and len(searched) < MAX_ERRORS:
         searched[key] = next(_similar_names(context, endpoint), None)
     return searched.get(key)

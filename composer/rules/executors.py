@@ -13,18 +13,17 @@ from composer.base.diagnostics import (
     error,
     errors_subject,
     info,
-    suggestion,
     warning,
 )
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.language.rules import UNUSED_DECLARATION
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
-from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.context import Context
 from composer.rules.analysis.formatting import number
 from composer.rules.analysis.rates import Cause, Rates, rates
-from composer.rules.analysis.subjects import earlier_errors, unknown_subjects, used_parameters
-from composer.rules.references import UNDECLARED_NAME, absence
+from composer.rules.analysis.subjects import earlier_errors, used_parameters
+from composer.rules.references import unknown_names
 
 EXECUTOR_OVERLOADED = error("RC413", "executor-overloaded")
 EXECUTOR_SETTINGS = warning("RC417", "executor-settings")
@@ -37,20 +36,9 @@ _BUSY = 0.7
 
 def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
     """Check the executor of every node that names one."""
-    known = {executor.name.value for executor in context.system.executors} | {DEFAULT_EXECUTOR}
-    for node in context.system.nodes if not context.is_partial else ():
-        name = node.executor
-        if name is None or name.value in known or is_unresolved(name.value):
-            continue
-        why = absence(context.system, "executors", name.value, "an executor")
-        yield Diagnostic(
-            UNDECLARED_NAME,
-            f"node '{node.name}' runs on '{name}', {why.text}",
-            name.span,
-            why.labels,
-            why.hint or suggestion(name.value, known),
-            subjects=unknown_subjects("executor", name.value, known),
-        )
+    nodes = context.system.nodes
+    named = ((f"node '{node.name}' runs on '{node.executor}'", node.executor) for node in nodes)
+    yield from unknown_names(context, "executor", named)
 
 
 def check_unused_executor(context: Context) -> Iterator[Diagnostic]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
-from composer.base.diagnostics import Diagnostic, Label, error, suggestion
+from composer.base.diagnostics import Diagnostic, Label, error
 from composer.base.source import Located
 from composer.language.rules import UNUSED_DECLARATION
 from composer.model import DiscoveryKind, Host
@@ -24,7 +25,7 @@ from composer.model.hosts import (
 )
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.subjects import is_misspelled
-from composer.rules.references import UNDECLARED_NAME, absence
+from composer.rules.references import unknown_names
 
 INVALID_HOST = error("RC492", "invalid-host")
 ENVIRONMENT_VARIABLE = error("RC494", "environment-variable")
@@ -32,22 +33,12 @@ ENVIRONMENT_VARIABLE = error("RC494", "environment-variable")
 
 def check_unknown_host(context: Context) -> Iterator[Diagnostic]:
     """Check the hosts of processes."""
-    system = context.system
-    if context.is_partial:
-        return
-    hosts = [host.name.value for host in system.hosts]
-    for process in system.processes:
-        name = process.host
-        if name is None or name.value in hosts or is_unresolved(name.value):
-            continue
-        why = absence(system, "hosts", name.value, "a host")
-        yield Diagnostic(
-            UNDECLARED_NAME,
-            f"process '{process.name}' runs on '{name}', {why.text}",
-            name.span,
-            why.labels,
-            why.hint or suggestion(name.value, hosts) or "declare it under 'hosts:'",
-        )
+    named = (
+        (f"process '{process.name}' runs on '{process.host}'", process.host)
+        for process in context.system.processes
+    )
+    for diagnostic in unknown_names(context, "host", named):
+        yield replace(diagnostic, hint=diagnostic.hint or "declare it under 'hosts:'")
 
 
 def check_unused_host(context: Context) -> Iterator[Diagnostic]:

@@ -11,7 +11,7 @@ from composer.model.names import topic_name_problem
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.subjects import NODES_OF_PROCESSES, earlier_errors, unknown_subjects
 from composer.rules.executors import LOST_BETWEEN_PROCESSES
-from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE, absence
+from composer.rules.references import UNKNOWN_NODE, unknown_names
 
 CONFLICTING_PROCESS = error("RC479", "conflicting-process")
 MANY_SERVICES = warning("RC488", "many-services")
@@ -22,20 +22,10 @@ def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
     system = context.system
     if context.is_partial:
         return
-    processes = [process.name.value for process in system.processes]
-    for node in system.nodes:
-        name = node.process
-        if name is None or name.value in processes or is_unresolved(name.value):
-            continue
-        why = absence(system, "processes", name.value, "a process")
-        yield Diagnostic(
-            UNDECLARED_NAME,
-            f"node '{node.name}' runs in '{name}', {why.text}",
-            name.span,
-            why.labels,
-            why.hint or suggestion(name.value, processes),
-            subjects=unknown_subjects("process", name.value, processes),
-        )
+    named = (
+        (f"node '{node.name}' runs in '{node.process}'", node.process) for node in system.nodes
+    )
+    yield from unknown_names(context, "process", named)
     nodes = [node.name.value for node in system.nodes]
     known = frozenset(nodes)
     for process in system.processes:
@@ -133,11 +123,7 @@ def check_separate_process(context: Context) -> Iterator[Diagnostic]:
 
 def check_isolation_between_processes(context: Context) -> Iterator[Diagnostic]:
     """Check the connections with 'isolation', with all ports of their topics."""
-    channel_of = {
-        (end.node.name.value, end.port.name.value): channel
-        for channel in context.channels
-        for end in channel.ends
-    }
+    channel_of = {end.key: channel for channel in context.channels for end in channel.ends}
     for connection in context.system.connections:
         if connection.isolation is None:
             continue

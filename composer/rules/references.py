@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, Subject, error, suggestion
 from composer.base.fast_dataclass import dataclass
-from composer.model import Chain, ChannelKind, Connection, Endpoint, Node, Port, PortKind, System
+from composer.base.source import Located
+from composer.model import (
+    DEFAULT_EXECUTOR,
+    Chain,
+    ChannelKind,
+    Connection,
+    Endpoint,
+    Node,
+    Port,
+    PortKind,
+    System,
+)
 from composer.rules.analysis.context import Context, is_unresolved, location, part_of
 from composer.rules.analysis.expressions import sends
 from composer.rules.analysis.formatting import a, either
@@ -57,6 +69,45 @@ def absence(system: System, section: str, name: str, noun: str) -> Absence:
     return Absence(text, labels, hint)
 
 
+_SECTIONS = {"node": "nodes", "executor": "executors", "process": "processes", "host": "hosts"}
+
+
+def declared(context: Context) -> Mapping[str, Mapping[str, None]]:
+    """Return the names of what a system declares, in order, by kind."""
+    system = context.system
+    executors = (*(executor.name.value for executor in system.executors), DEFAULT_EXECUTOR)
+    return {
+        "node": dict.fromkeys(node.name.value for node in system.nodes),
+        "executor": dict.fromkeys(executors),
+        "process": dict.fromkeys(process.name.value for process in system.processes),
+        "host": dict.fromkeys(host.name.value for host in system.hosts),
+    }
+
+
+def unknown_name(context: Context, kind: str, message: str, name: Located[str]) -> Diagnostic:
+    """Return a diagnostic that begins with ``message``, and says why there is no such name."""
+    known = context.once(declared)[kind]
+    why = absence(context.system, _SECTIONS[kind], name.value, a(kind))
+    return Diagnostic(
+        UNKNOWN_NODE if kind == "node" else UNDECLARED_NAME,
+        f"{message}, {why.text}",
+        name.span,
+        why.labels,
+        why.hint or suggestion(name.value, known),
+        subjects=unknown_subjects(kind, name.value, known),
+    )
+
+
+def unknown_names(
+    context: Context, kind: str, named: Iterable[tuple[str, Located[str] | None]]
+) -> Iterator[Diagnostic]:
+    """Report the names that nothing declares; each comes after the first half of its message."""
+    known = context.once(declared)[kind]
+    for message, name in named if not context.is_partial else ():
+        if name is not None and name.value not in known and not is_unresolved(name.value):
+            yield unknown_name(context, kind, message, name)
+
+
 def _names_given(context: Context, connection: Connection | None) -> tuple[Subject, ...]:
     """Return what is not known of a connection that names the wrong port."""
     return () if connection is None else connection_subjects(context.system, connection)
@@ -68,8 +119,7 @@ def check_unknown_node(context: Context) -> Iterator[Diagnostic]:
         return
     for endpoint, connection in endpoints(context.system):
         yield from _node_of_endpoint(context, endpoint, connection)
-    for node in context.system.nodes:
-        yield from _unknown_dependencies(context, node)
+    yield from unknown_names(context, "node", _dependencies(context))
     for unknown in context.system.unknown:
         why = absence(context.system, "nodes", unknown.name.value, "a node")
         message = f"'{unknown.name}' is not a node of this system"
@@ -94,36 +144,18 @@ def _node_of_endpoint(
         message = f"'{endpoint.text}' is not of the form 'node.port'"
         yield Diagnostic(UNKNOWN_NODE, message, endpoint.text.span, subjects=names)
         return
-    why = absence(context.system, "nodes", name, "a node")
-    yield Diagnostic(
-        UNKNOWN_NODE,
-        f"'{endpoint.text}' names node '{name}', {why.text}",
-        part_of(endpoint.text, 0, len(name)),
-        why.labels,
-        why.hint or suggestion(name, context.once(_node_names)),
-        subjects=(*unknown_subjects("node", name, context.once(_node_names)), *names),
-    )
+    message = f"'{endpoint.text}' names node '{name}'"
+    at = Located(name, part_of(endpoint.text, 0, len(name)))
+    unknown = unknown_name(context, "node", message, at)
+    yield replace(unknown, subjects=(*unknown.subjects, *names))
 
 
-def _unknown_dependencies(context: Context, node: Node) -> Iterator[Diagnostic]:
-    for dependency in node.depends_on:
-        name = dependency.node
-        if is_unresolved(name.value) or context.system.node(name.value) is not None:
-            continue
-        verb = "has the container" if dependency.is_container else "depends on"
-        why = absence(context.system, "nodes", name.value, "a node")
-        yield Diagnostic(
-            UNKNOWN_NODE,
-            f"node '{node.name}' {verb} '{name}', {why.text}",
-            name.span,
-            why.labels,
-            why.hint or suggestion(name.value, context.once(_node_names)),
-            subjects=unknown_subjects("node", name.value, context.once(_node_names)),
-        )
-
-
-def _node_names(context: Context) -> tuple[str, ...]:
-    return tuple(node.name.value for node in context.system.nodes)
+def _dependencies(context: Context) -> Iterator[tuple[str, Located[str]]]:
+    """Yield the nodes that nodes depend on, after the first half of a message about them."""
+    for node in context.system.nodes:
+        for dependency in node.depends_on:
+            verb = "has the container" if dependency.is_container else "depends on"
+            yield f"node '{node.name}' {verb} '{dependency.node}'", dependency.node
 
 
 _PORT_SECTIONS = frozenset(kind.section for kind in PortKind)
@@ -364,8 +396,7 @@ def _all_wrong(
         hint = f"swap '{source_key}' and '{sink_key}'"
     else:
         message = (
-            f"'{connection.name}' connects the endpoints of {_channel_with_article(kind)}, "
-            f"not of {_channel_with_article(connection.kind)}"
+            f"'{connection.name}' connects the endpoints of {a(kind)}, not of {a(connection.kind)}"
         )
         (source_key, _), (sink_key, _) = _ENDS[kind]
         hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
@@ -379,10 +410,6 @@ def _belongs(connection: Connection, actual: PortKind) -> str:
         other = next(key for key, kind in _ENDS[connection.kind] if kind is actual)
         return f"{a(actual)} belongs under '{other}'"
     return f"{a(actual)} belongs in a connection that starts with '{actual.channel}:'"
-
-
-def _channel_with_article(kind: ChannelKind) -> str:
-    return f"{'an' if kind.value.startswith('a') else 'a'} {kind}"
 
 
 def _sending_hint(kind: PortKind) -> str | None:

@@ -29,12 +29,11 @@ from composer.model.scenario import (
 from composer.python_code.nodes import handlers
 from composer.rules.analysis.context import Context, part_of_path
 from composer.rules.analysis.parameters import KNOWN_TYPES, range_problem, type_problem
-from composer.rules.analysis.subjects import unknown_subjects
 from composer.rules.expressions import INVALID_VALUE, UNKNOWN_FIELD, UNKNOWN_NAME
 from composer.rules.implementations import SETTING_WITHOUT_EFFECT
 from composer.rules.parameter_values import PARAMETER_VALUE
 from composer.rules.parameters import UNKNOWN_PARAMETER
-from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE, absence
+from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE, unknown_name
 
 _KINDS = (*EventKind, *ExpectationKind)
 _COUNTS = frozenset({"after_s", "within_s", "at_least", "at_most"})
@@ -172,18 +171,13 @@ def check_exploration(context: Context) -> Iterator[Diagnostic]:
 
 
 def _unknown_node(context: Context, name: Located[str], node: str) -> Iterator[Diagnostic]:
-    system = context.system
     if _is_replaced(context, node):
         message = f"node '{node}' is not in the run: a bag replaces it"
         yield Diagnostic(UNKNOWN_NODE, message, name.span)
-    elif system.node(node) is None:
-        names = [item.name.value for item in system.nodes]
-        why = absence(system, "nodes", node, "a node")
-        message = f"'{name}' names node '{node}', {why.text}"
+    elif context.system.node(node) is None:
+        message = f"'{name}' names node '{node}'"
         span = name.span.part(0, len(node)) if name.value != node else name.span
-        hint = why.hint or suggestion(node, names)
-        subjects = unknown_subjects("node", node, names)
-        yield Diagnostic(UNKNOWN_NODE, message, span, why.labels, hint, subjects=subjects)
+        yield unknown_name(context, "node", message, Located(node, span))
 
 
 def _is_replaced(context: Context, node: str) -> bool:

@@ -39,7 +39,7 @@ def type_mismatches(context: Context) -> tuple[TypeMismatch, ...]:
 def certain_field_problems(context: Context) -> Iterator[Problem]:
     """Yield the problems with fields, except of ports whose type is probably wrong."""
     doubtful = {
-        _key(endpoint)
+        endpoint.key
         for mismatch in context.once(type_mismatches)
         for endpoints in mismatch.others.values()
         for endpoint in endpoints
@@ -60,7 +60,7 @@ def wrong_connection(
     here: list[Endpoint] = []
     elsewhere: list[Connection] = []
     for connection in context.system.connections:
-        own = [end for end in connection.ends if (end.node, end.port) == _key(endpoint)]
+        own = [end for end in connection.ends if (end.node, end.port) == endpoint.key]
         if not own or connection.kind is not mismatch.channel.kind:
             continue
         if _channel_name(context, connection) == mismatch.channel.name:
@@ -80,7 +80,7 @@ def misnamed_port(context: Context, mismatch: TypeMismatch) -> tuple[Endpoint, s
 
     The other one has the type of the channel, and the name of the channel or of another port on it.
     """
-    ends = set(map(_key, mismatch.channel.ends))
+    ends = {endpoint.key for endpoint in mismatch.channel.ends}
     for connection in _connections(context, mismatch):
         for end in connection.ends:
             meant = _meant_port(context, connection, end) if (end.node, end.port) in ends else None
@@ -146,9 +146,7 @@ def _channel_name(context: Context, connection: Connection) -> str:
 def _has_type(context: Context, connection: Connection, endpoint: PortOfNode) -> bool:
     """Return whether another port of a connection has the type of a port."""
     ports = (
-        context.system.port(end)
-        for end in connection.ends
-        if (end.node, end.port) != _key(endpoint)
+        context.system.port(end) for end in connection.ends if (end.node, end.port) != endpoint.key
     )
     own = endpoint.port.interface.value
     return any(port is not None and port.interface.value == own for port in ports)
@@ -156,7 +154,7 @@ def _has_type(context: Context, connection: Connection, endpoint: PortOfNode) ->
 
 def _fits_only_own(context: Context, endpoint: PortOfNode, other: str) -> bool:
     """Return whether what a node does with a port fits its type, and not another one."""
-    key, node, port = _key(endpoint), endpoint.node, endpoint.port
+    key, node, port = endpoint.key, endpoint.node, endpoint.port
     if any(found.port == key for found in context.once(field_problems)):
         return False
     changed = replace(port, interface=port.interface.map(lambda _: other))
@@ -189,7 +187,7 @@ def _mismatch(
 
     def weight(name: str) -> tuple[bool, int, bool]:
         endpoints = by_type[name]
-        fits = not any(_key(endpoint) in troubled for endpoint in endpoints)
+        fits = not any(endpoint.key in troubled for endpoint in endpoints)
         return fits, len(endpoints), any(map(_is_of_node_type, endpoints))
 
     common = max(by_type, key=weight)
@@ -199,10 +197,6 @@ def _mismatch(
 
 def _is_of_node_type(endpoint: PortOfNode) -> bool:
     return endpoint.port.interface.span.file != endpoint.node.name.span.file
-
-
-def _key(endpoint: PortOfNode) -> tuple[str, str]:
-    return endpoint.node.name.value, endpoint.port.name.value
 
 
 #: Maximum number of further endpoints with the same wrong type to show.
@@ -223,11 +217,7 @@ def check_type_mismatch(context: Context) -> Iterator[Diagnostic]:
 def _wrong_port(context: Context, mismatch: TypeMismatch, end: Endpoint, meant: str) -> Diagnostic:
     """Report a connection that names the wrong port of a node."""
     channel = mismatch.channel
-    wrong = next(
-        item
-        for item in channel.ends
-        if (item.node.name.value, item.port.name.value) == (end.node, end.port)
-    )
+    wrong = next(item for item in channel.ends if item.key == (end.node, end.port))
     own = wrong.port.interface.value
     other = next(item for item in channel.ends if item.port.interface.value != own)
     return Diagnostic(

@@ -14,9 +14,9 @@ from composer.model import PortKind, PortOfNode
 _LONG_VALUE = re.compile(rf"'([^']{{{MAXIMUM_VALUE_LENGTH + 1},}})'")
 
 
-def a(kind: PortKind) -> str:
-    """Return the kind with its article: ``an action server``."""
-    return f"{'an' if kind.value.startswith('a') else 'a'} {kind}"
+def a(kind: str) -> str:
+    """Return the name of a kind with its article: ``an action server``."""
+    return f"{'an' if kind[0] in 'ae' else 'a'} {kind}"
 
 
 def either(kinds: Sequence[PortKind]) -> str:

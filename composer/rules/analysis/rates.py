@@ -171,7 +171,7 @@ def timed_publishers(context: Context) -> tuple[tuple[PortOfNode, float], ...]:
     found = []
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.PUBLISHER):
-            of_port = context.once(causes).get(_key(PortOfNode(node, port)), ())
+            of_port = context.once(causes).get(PortOfNode(node, port).key, ())
             periods = [
                 node.period_s(cause.timer) if cause.timer is not None else None for cause in of_port
             ]
@@ -234,7 +234,7 @@ def _in_order_of_cause(
         causing = {
             cause.port.full_name
             for endpoint in endpoints
-            for cause in known.get(_key(endpoint), ())
+            for cause in known.get(endpoint.key, ())
             if cause.port is not None and cause.port.full_name in publishers
         }
         missing_causes[name] = len(causing)
@@ -253,7 +253,7 @@ def _in_order_of_cause(
 def _publisher_hz(
     known: Causes, topics: Mapping[str, float | None], endpoint: PortOfNode
 ) -> float | None:
-    found = known.get(_key(endpoint))
+    found = known.get(endpoint.key)
     if found is None:
         return None
     return _total(_callback_hz(topics, endpoint.node, cause) for cause in found)
@@ -277,7 +277,3 @@ def _total(found: Iterable[float | None]) -> float | None:
             return None
         total += rate_hz
     return total
-
-
-def _key(endpoint: PortOfNode) -> tuple[str, str]:
-    return endpoint.node.name.value, endpoint.port.name.value
