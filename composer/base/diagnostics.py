@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from enum import Enum
 from typing import TypeAlias
 
@@ -160,6 +160,13 @@ def shown(value: object, *, limit: int = MAXIMUM_VALUE_LENGTH) -> str:
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
     """Return the candidate closest to ``name``, or None."""
     return next(iter(vocabulary(tuple(candidates)).close(name)), None)
+
+
+def nearest_full_name(name: str, known: Collection[str]) -> str | None:
+    """Return the name in the ROS graph closest to ``name``, with its namespace or without."""
+    by_last_part = {found.rpartition("/")[2]: found for found in known}
+    match = nearest(name.rpartition("/")[2], by_last_part)
+    return nearest(name, known) or (by_last_part[match] if match is not None else None)
 
 
 def suggestion(name: str, candidates: Iterable[str], *, limit: int = 8) -> str | None:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from composer.base.diagnostics import nearest
+from composer.base.diagnostics import nearest_full_name
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.model.names import is_hidden, is_selected, topic_name_problem
 from composer.runtime.protocol.requests import NameAndTypes, visible_names
@@ -167,11 +167,7 @@ def _hint(kind: str, name: str, known: list[str]) -> str:
             f"no {kind} was found: check that the system is running, and that ROS_DOMAIN_ID and"
             " the discovery range are the same"
         )
-    close = nearest(name, known)
-    if close is None:
-        by_last_part = {found.rpartition("/")[2]: found for found in known}
-        match = nearest(name.rpartition("/")[2], by_last_part)
-        close = by_last_part[match] if match is not None else None
+    close = nearest_full_name(name, known)
     if close is not None:
         return f"did you mean '{close}'?"
     more = ", ..." if len(known) > _MAX_LISTED else ""

@@ -14,7 +14,6 @@ from composer.base.diagnostics import (
     Rule,
     Severity,
     error,
-    nearest,
     shown,
     suggestion,
     warning,
@@ -251,12 +250,8 @@ def _is_exactly(rule: Rule, text: Located[str]) -> bool:
 def _unknown(text: Located[str], rules: Iterable[Rule]) -> Diagnostic:
     names = [name for rule in rules for name in (rule.code, rule.name)]
     message = f"there is no rule '{shown(text.value)}'"
-    close = nearest(text.value, names)
-    hint = (
-        f"did you mean '{close}'?"
-        if close is not None
-        else "'compose validate --explain RC' lists the rules"
-    )
+    close = suggestion(text.value, names, limit=0)
+    hint = close or "'compose validate --explain RC' lists the rules"
     return Diagnostic(BAD_SETTING, message, text.span, hint=hint)
 
 

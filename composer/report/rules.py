@@ -10,7 +10,7 @@ import composer.language.expand
 import composer.language.schema
 import composer.model.resolve
 import composer.rules
-from composer.base.diagnostics import Diagnostic, Rule, nearest, registered_rules
+from composer.base.diagnostics import Diagnostic, Rule, registered_rules, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.resources import rules_folder
 
@@ -59,8 +59,8 @@ def select_diagnostics(
 
 
 def _hint(text: str, rules: Iterable[Rule]) -> str | None:
-    close = nearest(text, [name for rule in rules for name in (rule.code, rule.name)])
-    return None if close is None else f"did you mean '{close}'?"
+    names = (name for rule in rules for name in (rule.code, rule.name))
+    return suggestion(text, names, limit=0)
 
 
 _PAGE = re.compile(

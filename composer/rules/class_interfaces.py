@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from composer.base.diagnostics import Diagnostic, Label, Severity, error, nearest
+from composer.base.diagnostics import Diagnostic, Label, Severity, error, nearest, suggestion
 from composer.base.spelling import misspelled
 from composer.model import (
     USE_SIM_TIME,
@@ -65,9 +65,8 @@ def _missing_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic]:
         if _last(name) in map(_last, names) or not others:
             continue
         message = f"class '{item.hosted.reference.class_name}' creates no {port.kind} '{name}'"
-        close = nearest(name, others)
         listed = " and ".join(f"'{other}'" for other in others)
-        hint = f"did you mean '{close}'?" if close is not None else f"it creates {listed}"
+        hint = suggestion(name, others, limit=0) or f"it creates {listed}"
         # Connections may name a port as the class does.
         meant = sorted({port.name.value, *others})
         subjects = tuple(("port", f"{item.node.name}.{other}") for other in meant)

@@ -18,9 +18,9 @@ from composer.base.diagnostics import (
     Diagnostic,
     Rule,
     Severity,
-    nearest,
     registered_rules,
     shown,
+    suggestion,
     warning,
 )
 from composer.base.fast_dataclass import dataclass
@@ -162,12 +162,7 @@ def _unused(ignore: Ignore, names: tuple[str, ...], *, is_error: bool) -> Diagno
     if ignore.rule in names:
         message = f"there is no '{ignore.rule}' to ignore here"
         return Diagnostic(UNUSED_IGNORE, message, ignore.span, hint="remove it")
-    close = nearest(ignore.rule, names)
-    hint = (
-        f"did you mean '{close}'?"
-        if close is not None
-        else "'compose validate --explain RC' lists the rules"
-    )
-    return Diagnostic(
-        UNUSED_IGNORE, f"no rule is named '{shown(ignore.rule)}'", ignore.span, hint=hint
-    )
+    message = f"no rule is named '{shown(ignore.rule)}'"
+    close = suggestion(ignore.rule, names, limit=0)
+    hint = close or "'compose validate --explain RC' lists the rules"
+    return Diagnostic(UNUSED_IGNORE, message, ignore.span, hint=hint)

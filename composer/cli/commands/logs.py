@@ -170,12 +170,11 @@ def _chosen(runs: list[Run], name: str | None) -> Run:
     for run in runs:
         if run.name == name:
             return run
-    from composer.base.diagnostics import nearest
+    from composer.base.diagnostics import suggestion
 
-    close = nearest(name, [run.name for run in runs])
+    hint = suggestion(name, (run.name for run in runs), limit=0)
     raise CommandError(
-        f"there is no run '{name}'",
-        hint=f"did you mean '{close}'?" if close else "'compose logs --list' lists the runs",
+        f"there is no run '{name}'", hint=hint or "'compose logs --list' lists the runs"
     )
 
 

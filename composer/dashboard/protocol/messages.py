@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.base.characters import escape_line
-from composer.base.diagnostics import nearest
+from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.language.document.scalars import text_of_not_finite
 
@@ -79,8 +79,7 @@ class BadRequestError(RequestError):
 
 def unknown(what: str, name: str, choices: Iterable[str]) -> BadRequestError:
     """Return the error for a name that is none of the choices."""
-    close = nearest(name, choices)
-    hint = f"did you mean '{close}'?" if close else None
+    hint = suggestion(name, choices, limit=0)
     return BadRequestError(f"there is no {what} '{name:.80}'", hint)
 
 
@@ -202,8 +201,7 @@ class Values:
         """Raise BadRequestError for a key that was not read."""
         for key in self._content:
             if key not in self._known:
-                close = nearest(key, self._known)
-                hint = f"did you mean '{close}'?" if close else None
+                hint = suggestion(key, self._known, limit=0)
                 raise BadRequestError(f"{self._what} has no key '{key:.80}'", hint)
 
     def _get(self, key: str, kind: type[T], default: T | None) -> T:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from composer.base.diagnostics import Diagnostic, Label, nearest, shown
+from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.language import rules
 from composer.language.tree import Mapping, Scalar, Sequence, Tree, describe, plain
@@ -113,8 +113,7 @@ def typed(tree: Tree, declared: Declared, word: str) -> tuple[Tree, Diagnostic |
     if values and plain(converted) not in values:
         text = shown(plain(converted))
         listed = ", ".join(f"'{shown(value)}'" for value in values)
-        close = nearest(text, [shown(value) for value in values])
-        hint = f"use one of {listed}" if close is None else f"did you mean '{close}'?"
+        hint = suggestion(text, map(shown, values), limit=0) or f"use one of {listed}"
         message = f"'{text}' is not a choice of {word} '{name}'"
         return converted, Diagnostic(rules.UNKNOWN_WORD, message, tree.span, (label,), hint)
     return converted, None

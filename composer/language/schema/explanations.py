@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field
 from itertools import islice
 
-from composer.base.diagnostics import Diagnostic, Label, nearest, shown
+from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language import rules
@@ -290,8 +290,7 @@ def _no_word_or_variable(error: _LocatedError, _: _MisspelledKeys) -> Iterator[D
 def _no_word_of(error: _LocatedError, words: list[str]) -> Iterator[Diagnostic]:
     found = describe(error.tree)
     message = f"expected {_any_of(words)}{error.subject}, found {found}"
-    close = nearest(error.instance, words) if isinstance(error.instance, str) else None
-    hint = f"did you mean '{close}'?" if close is not None else None
+    hint = suggestion(error.instance, words, limit=0) if isinstance(error.instance, str) else None
     hint = hint or value_advice(error.path, error.instance)
     yield Diagnostic(rules.UNKNOWN_WORD, message, error.value_span, hint=hint)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
 
-from composer.base.diagnostics import nearest, shown
+from composer.base.diagnostics import nearest, nearest_full_name, shown
 from composer.base.source import Located
 from composer.language.tree import Plain
 from composer.model import (
@@ -122,12 +122,7 @@ def _is_manager(system: System, other: ObservedNode) -> bool:
 
 
 def _missing_node(node: Node, others: Sequence[ObservedNode]) -> Drift:
-    names = {other.full_name: other.full_name for other in others}
-    by_last_part = {name.rpartition("/")[2]: name for name in names}
-    close = nearest(node.full_name, names)
-    if close is None:
-        match = nearest(node.ros_name.value, by_last_part)
-        close = by_last_part[match] if match is not None else None
+    close = nearest_full_name(node.full_name, [other.full_name for other in others])
     hint = f"'{close}' exists: did you mean that?" if close is not None else ""
     return Drift(DriftKind.MISSING_NODE, node.full_name, hint=hint, span=node.name.span)
 
