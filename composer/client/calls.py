@@ -66,11 +66,7 @@ def call_service(session: Session, deadline: Deadline, request: ServiceRequest) 
     with closing(ServiceCaller(session)) as caller:
         next_s = time.monotonic()
         while True:
-            try:
-                yield caller.call_once(service, request.name, message, deadline)
-            except NoResponseError as error:
-                hint = type_mismatch_hint(session, "service", request.name, request.type_name)
-                raise NoResponseError(str(error), hint) from error
+            yield caller.call_once(service, request.name, message, deadline)
             if request.rate_hz is None:
                 return
             next_s = max(next_s + 1.0 / request.rate_hz, time.monotonic())

@@ -91,12 +91,7 @@ class LifecycleClient:
 
     def states(self, nodes: Iterable[str]) -> dict[str, str | None]:
         """Return the label of each node's state, None for nodes that did not respond in time."""
-        requests = dict.fromkeys(nodes, GetState.Request())
-        responses = self._services.call_all(GetState, requests, self._deadline)
-        return {
-            node: None if response is None else str(response.current_state.label)
-            for node, response in responses.items()
-        }
+        return self._services.states(nodes, self._deadline)
 
     def transitions(self, node: str) -> tuple[Transition, ...]:
         """Return the transitions that are available now. Raises NoResponseError."""

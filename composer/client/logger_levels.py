@@ -12,8 +12,9 @@ from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 
 from composer.client.graph_names import GraphNames
-from composer.client.requests import call_all_with_retries, call_once, required
+from composer.client.requests import ServiceCaller, required
 from composer.client.session import Deadline, RosError, Session
+from composer.client.systems.local_queries import nodes_with
 from composer.client.systems.managers import DISCOVERY_S, Systems
 from composer.model import SEVERITIES, LogLevel
 from composer.runtime.callbacks.log import logger_name
@@ -37,6 +38,7 @@ class LoggerLevels:
         self._session = session
         self._deadline = deadline
         self._systems = Systems(session, deadline)
+        self._caller = ServiceCaller(session)
 
     def all(self) -> dict[str, str | None]:
         """Return the levels of all nodes that can be asked, None for those that do not respond."""
@@ -70,9 +72,8 @@ class LoggerLevels:
         request = SetLoggerLevels.Request(
             levels=[LoggerLevel(name=logger_name(found), level=SEVERITIES[level])]
         )
-        response = call_once(
-            self._session, SetLoggerLevels, f"{server}/{_SET}", request, self._deadline
-        )
+        service = f"{server}/{_SET}"
+        response = self._caller.call_once(SetLoggerLevels, service, request, self._deadline)
         (result,) = response.results
         if not result.successful:
             raise LevelRejectedError(f"{found} did not set its log level: {result.reason}")
@@ -81,9 +82,8 @@ class LoggerLevels:
     def _levels(self, server: str, nodes: list[str]) -> dict[str, Any]:
         """Return the response of a server by the name of its service, None without one."""
         request = GetLoggerLevels.Request(names=list(map(logger_name, nodes)))
-        return call_all_with_retries(
-            self._session, GetLoggerLevels, [f"{server}/{_GET}"], request, self._deadline
-        )
+        calls = {f"{server}/{_GET}": (GetLoggerLevels, request)}
+        return self._caller.call_each(calls, self._deadline)
 
     def _find(self, node: str) -> tuple[str, str]:
         """Return the full name of a node, and the node with the services for it."""
@@ -110,11 +110,7 @@ class LoggerLevels:
             for item in report.nodes
             if (item.pid, item.host or report.host) == (report.pid, report.host)
         }
-        own = (
-            name.removesuffix(f"/{_GET}")
-            for name, types in self._session.graph.services()
-            if name.endswith(f"/{_GET}") and _GET_TYPE in types
-        )
+        own = nodes_with(self._session.graph.services(), f"/{_GET}", _GET_TYPE)
         return of_managers | {node: node for node in own}
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from typing import Any
 
@@ -18,6 +18,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.task import Future
 
+from composer.client.graph_names import type_mismatch_hint
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.model.names import join_node_name
 from composer.runtime.ros_graph.graph import participant, servers_of
@@ -57,14 +58,20 @@ class ServiceCaller:
         """Return the response to a request that is sent only once. Raises NoResponseError."""
         client = self._client(service, name)
         if not self._session.wait_for(lambda: client.service_is_ready() or None, deadline):
-            raise NoResponseError(
-                f"no server of service '{name}' found within {deadline.timeout_s:g} s"
-            )
+            text = f"no server of service '{name}' found within {deadline.timeout_s:g} s"
+            raise self._error(text, service, name)
         servers = frozenset(map(participant, servers_of(self._session.node, name)))
         if servers != self._knowing.get(name):
             wait_until_known(self._session, name, deadline)
             self._knowing[name] = servers
-        return required(self._call({name: (service, request)}, deadline, math.inf), deadline)
+        response = self._call({name: (service, request)}, deadline, math.inf)[name]
+        if response is None:
+            raise self._error(_silence(name, deadline), service, name)
+        return response
+
+    def _error(self, text: str, service: Any, name: str) -> NoResponseError:
+        hint = type_mismatch_hint(self._session, "service", name, type_of(service))
+        return NoResponseError(text, hint)
 
     def _call(
         self, calls: Mapping[str, tuple[Any, Any]], deadline: Deadline, retry_after_s: float
@@ -102,33 +109,26 @@ def wait_until_known(session: Session, service: str, deadline: Deadline) -> bool
         return False
     limit = Deadline(min(_KNOWN_WITHIN_S, deadline.left_s))
     request = GetParameters.Request()
-    responses = call_all_with_retries(session, GetParameters, [read_service], request, limit)
+    with closing(ServiceCaller(session)) as caller:
+        responses = caller.call_each({read_service: (GetParameters, request)}, limit)
     return responses[read_service] is not None
 
 
-def call_all_with_retries(
-    session: Session, service: Any, names: Iterable[str], request: Any, deadline: Deadline
-) -> dict[str, Any]:
-    """Send a read request to services of one type; None for those that did not respond in time."""
-    with closing(ServiceCaller(session)) as caller:
-        return caller.call_each(dict.fromkeys(names, (service, request)), deadline)
-
-
-def call_once(session: Session, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
-    """Return the response to a request that is sent only once.
-
-    Raises NoResponseError; the server may have handled the request nevertheless.
-    """
-    with closing(ServiceCaller(session)) as caller:
-        return caller.call_once(service, name, request, deadline)
+def type_of(service: Any) -> str:
+    """Return the type of a class of services: ``std_srvs/srv/Trigger``."""
+    return f"{service.__module__.partition('.')[0]}/srv/{service.__name__}"
 
 
 def required(responses: Mapping[str, Any], deadline: Deadline) -> Any:
     """Return the response of the only service. Raises NoResponseError."""
     ((name, response),) = responses.items()
     if response is None:
-        raise NoResponseError(f"service '{name}' did not respond within {deadline.timeout_s:g} s")
+        raise NoResponseError(_silence(name, deadline))
     return response
+
+
+def _silence(name: str, deadline: Deadline) -> str:
+    return f"service '{name}' did not respond within {deadline.timeout_s:g} s"
 
 
 def _read_service(session: Session, service: str) -> str | None:

@@ -44,7 +44,8 @@ class GraphObserver:
         graph = session.graph
         ends = dict(session.wait_until_settled(lambda: endpoints(graph), deadline))
         counts = Counter(node_names(graph))
-        states = self._states(ends.keys(), deadline)
+        asked = self._asked(ends.keys(), GetState, deadline)
+        states = self._services.states(asked, self._limit(deadline))
         parameters = self.parameters(ends.keys(), deadline)
         containers = self._containers(deadline)
         return Snapshot(
@@ -72,13 +73,6 @@ class GraphObserver:
         topics = visible_topics(self._session.graph)
         return measure_rates(self._session, topics, min(measure_s, deadline.left_s))
 
-    def _states(self, nodes: Collection[str], deadline: Deadline) -> dict[str, str | None]:
-        responses = self._responses(nodes, GetState, deadline)
-        return {
-            node: None if response is None else str(response.current_state.label)
-            for node, response in responses.items()
-        }
-
     def _containers(self, deadline: Deadline) -> dict[str, str]:
         """Return the container of each loaded component, by full names, as far as they are known.
 
@@ -96,7 +90,7 @@ class GraphObserver:
         except MessageError:
             return {}
         requests = dict.fromkeys(servers, kind.Request())
-        responses = self._services.call_all(kind, requests, self._response_deadline(deadline))
+        responses = self._services.call_all(kind, requests, self._limit(deadline))
         return {
             str(name): server.removesuffix(_CONTAINER)
             for server, response in responses.items()
@@ -108,14 +102,15 @@ class GraphObserver:
         self, nodes: Collection[str], deadline: Deadline
     ) -> dict[str, dict[str, Plain] | None]:
         """Return the parameters of the nodes that have any, None without a response."""
-        responses = self._responses(nodes, ListParameters, deadline)
+        asked = self._asked(nodes, ListParameters, deadline)
+        lists = dict.fromkeys(asked, ListParameters.Request())
+        responses = self._services.call_all(ListParameters, lists, self._limit(deadline))
         requests = {
             node: GetParameters.Request(names=sorted(response.result.names))
             for node, response in responses.items()
             if response is not None
         }
-        limit = self._response_deadline(deadline)
-        values = self._services.call_all(GetParameters, requests, limit)
+        values = self._services.call_all(GetParameters, requests, self._limit(deadline))
         found: dict[str, dict[str, Plain] | None] = dict.fromkeys(responses)
         for node, response in values.items():
             names = requests[node].names
@@ -123,12 +118,10 @@ class GraphObserver:
                 found[node] = dict(zip(names, map(plain_value, response.values), strict=True))
         return found
 
-    def _responses(self, nodes: Collection[str], kind: Any, deadline: Deadline) -> dict[str, Any]:
-        """Return the response to an empty request of each node that has a service."""
-        offering = self._services.nodes(kind, self._response_deadline(deadline))
-        asked = [node for node in nodes if node in offering and not is_hidden(node)]
-        requests = dict.fromkeys(asked, kind.Request())
-        return self._services.call_all(kind, requests, self._response_deadline(deadline))
+    def _asked(self, nodes: Collection[str], kind: Any, deadline: Deadline) -> list[str]:
+        """Return the nodes that have a service."""
+        offering = self._services.nodes(kind, self._limit(deadline))
+        return [node for node in nodes if node in offering and not is_hidden(node)]
 
-    def _response_deadline(self, deadline: Deadline) -> Deadline:
+    def _limit(self, deadline: Deadline) -> Deadline:
         return Deadline(min(_RESPONSE_S, deadline.left_s))

@@ -197,11 +197,7 @@ def call_serialized(
     service_class = class_of(type_name, "service")
     message = _message(request, service_class.Request, f"{type_name}_Request")
     with closing(ServiceCaller(session)) as caller:
-        try:
-            response = caller.call_once(service_class, service, message, deadline)
-        except NoResponseError as error:
-            hint = type_mismatch_hint(session, "service", service, type_name)
-            raise NoResponseError(str(error), hint) from error
+        response = caller.call_once(service_class, service, message, deadline)
     return bytes(serialize_message(response))
 
 

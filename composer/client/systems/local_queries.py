@@ -50,6 +50,15 @@ def parse_state(name: str, text: str) -> SystemReport:
     return of_system(name, decode(split_signature(text)[1], SystemReport, clean=visible))
 
 
+def nodes_with(services: Iterable[NameAndTypes], suffix: str, type_name: str) -> set[str]:
+    """Return the nodes that have a service of that name and type."""
+    return {
+        name.removesuffix(suffix)
+        for name, types in services
+        if name.endswith(suffix) and type_name in types
+    }
+
+
 def of_system(name: str, report: SystemReport) -> SystemReport:
     """Return a report with the full name of the system, and the host of each node."""
     nodes = (node if node.host else replace(node, host=report.host) for node in report.nodes)
@@ -169,7 +178,7 @@ def all_local_parameters(timeout_s: float, *, hidden: bool) -> list[LocalParamet
     if view is None:
         return None
     known = _ask_parameters(None, timeout_s)
-    serving = _servers(view, _LIST_SERVICE, _LIST_TYPE)
+    serving = nodes_with(view["service"], _LIST_SERVICE, _LIST_TYPE)
     if not serving <= known.keys():
         return None
     return [known[node] for node in sorted(known) if hidden or not is_hidden(node)]
@@ -207,7 +216,7 @@ def local_reports(timeout_s: float, *, callbacks: bool = False) -> dict[str, Sys
         if name.endswith(_MANAGER_SERVICE)
     }
     nodes = {node.node for report in found.values() for node in report.nodes}
-    lifecycle_nodes = _servers(view, _STATE_SERVICE, _STATE_TYPE)
+    lifecycle_nodes = nodes_with(view["service"], _STATE_SERVICE, _STATE_TYPE)
     complete = len(found) == len(reports) and managers <= found.keys() and lifecycle_nodes <= nodes
     return with_callbacks_of_processes(found) if complete else None
 
@@ -261,12 +270,3 @@ def _find(name: str, timeout_s: float) -> str | None:
     nodes = () if answer is None else answer.nodes
     matches = [node for node in nodes if is_selected(node, name)]
     return matches[0] if len(matches) == 1 else None
-
-
-def _servers(view: GraphView, suffix: str, type_name: str) -> set[str]:
-    """Return the nodes with a service of that name and type."""
-    return {
-        name.removesuffix(suffix)
-        for name, types in view["service"]
-        if name.endswith(suffix) and type_name in types
-    }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterable
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -16,9 +17,9 @@ from std_srvs.srv import Trigger
 
 from composer.base.characters import visible
 from composer.client.graph_names import NotFoundError, not_found_error
-from composer.client.requests import call_once
+from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, Session
-from composer.client.systems.local_queries import parse_state, with_processes
+from composer.client.systems.local_queries import nodes_with, parse_state, with_processes
 from composer.model.names import is_selected
 from composer.runtime.process.instance_lock import is_held, local_systems
 from composer.runtime.protocol.codec import OtherVersionError, ProtocolError, decode
@@ -84,13 +85,8 @@ class Systems:
 
         The name is the namespace of the manager: ``/pipeline``, ``/robot1/pipeline``.
         """
-        found = tuple(
-            sorted(
-                name.removesuffix(_SERVICE)
-                for name, types in self._session.graph.services()
-                if name.endswith(_SERVICE) and name != _SERVICE and _TRIGGER_TYPE in types
-            )
-        )
+        services = self._session.graph.services()
+        found = tuple(sorted(nodes_with(services, _SERVICE, _TRIGGER_TYPE) - {""}))
         self.subscribe(found)
         return found
 
@@ -231,7 +227,8 @@ class Systems:
             raise self._no_response_error(name)
         full_name = f"{name}/{NAME}/{service}"
         try:
-            return call_once(self._session, kind, full_name, request, limit)
+            with closing(ServiceCaller(self._session)) as caller:
+                return caller.call_once(kind, full_name, request, limit)
         except NoResponseError as error:
             if limit.has_process_ended:
                 raise NoResponseError(f"{name} did not {command}: its process has ended") from error

@@ -8,12 +8,15 @@ them are sent to the manager, those to many nodes of a system as one: see
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, Self
 
-from composer.client.requests import ServiceCaller, required
+from lifecycle_msgs.srv import GetState
+
+from composer.client.requests import ServiceCaller, required, type_of
 from composer.client.session import Deadline, Session
+from composer.client.systems.local_queries import nodes_with
 from composer.client.systems.managers import Systems
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.requests import NAME, REQUEST, CallNodes, NodeCall
@@ -69,12 +72,7 @@ class NodeServices:
         """
         self._wait_for_reports(deadline)
         service = _name(kind)
-        type_name = f"{kind.__module__.partition('.')[0]}/srv/{kind.__name__}"
-        own = {
-            name.removesuffix(f"/{service}")
-            for name, types in self._session.graph.services()
-            if name.endswith(f"/{service}") and type_name in types
-        }
+        own = nodes_with(self._session.graph.services(), f"/{service}", type_of(kind))
         return own | {node for node, _ in self._left(service)}
 
     def call(
@@ -122,6 +120,14 @@ class NodeServices:
             if answers[service] is not None:
                 found |= _responses(kind, document, answers[service])
         return found
+
+    def states(self, nodes: Iterable[str], deadline: Deadline) -> dict[str, str | None]:
+        """Return the label of each node's state, None for those that did not respond in time."""
+        responses = self.call_all(GetState, dict.fromkeys(nodes, GetState.Request()), deadline)
+        return {
+            node: None if response is None else str(response.current_state.label)
+            for node, response in responses.items()
+        }
 
     def _wait_for_reports(self, deadline: Deadline) -> None:
         new = set(self._systems.discover()) - self._awaited  # wait for each manager only once
