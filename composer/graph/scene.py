@@ -13,13 +13,13 @@ from typing import TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.graph.diagram import Details, Problem
 from composer.model import ChannelKind, PortKind
+from composer.model.dependencies import by_channel
 
 T = TypeVar("T")
 
 #: Arrows for one channel in views that have no channels.
 MAX_PAIRS = 400
 
-_SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
 #: Ports that send messages or requests: their arrows point to the channel.
 SENDING = (PortKind.PUBLISHER, PortKind.CLIENT, PortKind.ACTION_CLIENT)
 
@@ -149,21 +149,12 @@ class SceneChannel:
 
 def channels(nodes: Iterable[SceneNode]) -> tuple[SceneChannel, ...]:
     """Return all topics, services and actions of the nodes, sorted by kind and name."""
-    by_channel: dict[tuple[ChannelKind, str], list[SceneEndpoint]] = {}
-    for node in nodes:
-        for port in node.ports:
-            by_channel.setdefault((port.kind.channel, port.channel), []).append(
-                SceneEndpoint(node, port)
-            )
-    return tuple(
-        SceneChannel(
-            kind,
-            name,
-            tuple(endpoint for endpoint in endpoints if endpoint.port.kind in _SOURCES),
-            tuple(endpoint for endpoint in endpoints if endpoint.port.kind not in _SOURCES),
-        )
-        for (kind, name), endpoints in sorted(by_channel.items())
+    ends = (
+        (port.kind, port.channel, SceneEndpoint(node, port))
+        for node in nodes
+        for port in node.ports
     )
+    return tuple(SceneChannel(*found) for found in by_channel(ends))
 
 
 def drawn_pairs(sources: Sequence[T], sinks: Sequence[T]) -> Iterator[tuple[T, T]]:

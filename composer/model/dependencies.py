@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
+from typing import TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.graphs import cycles, strong_groups
 from composer.model.node import Node, PrimaryState
 from composer.model.ports import ChannelKind, Port, PortKind
 from composer.model.system import System
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,18 @@ class Channel:
         return self.sources + self.sinks
 
 
-_SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
+def by_channel(
+    ends: Iterable[tuple[PortKind, str, T]],
+) -> Iterator[tuple[ChannelKind, str, tuple[T, ...], tuple[T, ...]]]:
+    """Yield each topic, service and action with its sources and sinks, sorted by kind and name.
+
+    ``ends`` are the kinds and names of ports, with what to yield for them.
+    """
+    found: dict[tuple[ChannelKind, str], tuple[list[T], list[T]]] = {}
+    for kind, name, end in ends:
+        found.setdefault((kind.channel, name), ([], []))[0 if kind.is_source else 1].append(end)
+    for (channel, name), (sources, sinks) in sorted(found.items()):
+        yield channel, name, tuple(sources), tuple(sinks)
 
 
 def channels(nodes: Iterable[Node], *, with_transforms: bool = False) -> tuple[Channel, ...]:
@@ -48,19 +62,12 @@ def channels(nodes: Iterable[Node], *, with_transforms: bool = False) -> tuple[C
 
     With transforms, /tf and /tf_static have the ports that follow from ``transforms``.
     """
-    ends: dict[tuple[ChannelKind, str], list[PortOfNode]] = {}
-    for node in nodes:
-        for port in node.all_ports if with_transforms else node.ports:
-            ends.setdefault((port.kind.channel, port.full_name), []).append(PortOfNode(node, port))
-    return tuple(
-        Channel(
-            kind,
-            name,
-            tuple(end for end in joined if end.port.kind in _SOURCES),
-            tuple(end for end in joined if end.port.kind not in _SOURCES),
-        )
-        for (kind, name), joined in sorted(ends.items())
+    ends = (
+        (port.kind, port.full_name, PortOfNode(node, port))
+        for node in nodes
+        for port in (node.all_ports if with_transforms else node.ports)
     )
+    return tuple(Channel(*found) for found in by_channel(ends))
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,6 +82,16 @@ class PortKind(StrEnum):
         """The kind of channel of such a port."""
         return _CHANNELS[self]
 
+    @property
+    def is_source(self) -> bool:
+        """Whether it is a publisher or a server."""
+        return self in (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
+
+    @property
+    def counterpart(self) -> PortKind:
+        """The kind of the ports that it connects to."""
+        return next(kind for kind in self.channel.ends if kind is not self)
+
 
 class ChannelKind(StrEnum):
     """The kinds of channels between nodes."""
@@ -94,6 +104,16 @@ class ChannelKind(StrEnum):
     def interface_folder(self) -> str:
         """The middle part of its interface names: ``msg``, ``srv`` or ``action``."""
         return {"topic": "msg", "service": "srv", "action": "action"}[self.value]
+
+    @property
+    def ends(self) -> tuple[PortKind, ...]:
+        """The kinds of its ports, the source first."""
+        return tuple(kind for kind in PortKind if kind.channel is self)
+
+    @property
+    def keys_of_ends(self) -> tuple[str, str]:
+        """The keys of a connection that name its ports, in the same order."""
+        return ("from", "to") if self is ChannelKind.TOPIC else ("server", "clients")
 
 
 _CHANNELS = {

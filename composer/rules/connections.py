@@ -27,21 +27,6 @@ _EXTERNAL_TOPICS = frozenset(
     {"/clock", "/diagnostics", "/parameter_events", "/robot_description", "/rosout"}
     | {"/tf", "/tf_static"}
 )
-_SOURCES = {
-    ChannelKind.TOPIC: PortKind.PUBLISHER,
-    ChannelKind.SERVICE: PortKind.SERVICE,
-    ChannelKind.ACTION: PortKind.ACTION_SERVER,
-}
-_SINKS = {
-    ChannelKind.TOPIC: PortKind.SUBSCRIPTION,
-    ChannelKind.SERVICE: PortKind.CLIENT,
-    ChannelKind.ACTION: PortKind.ACTION_CLIENT,
-}
-#: The kind of port that each kind of port connects to.
-COUNTERPARTS = {_SOURCES[kind]: _SINKS[kind] for kind in ChannelKind} | {
-    _SINKS[kind]: _SOURCES[kind] for kind in ChannelKind
-}
-
 _OUTSIDE = "record what other programs publish by 'compose record'"
 #: Maximum number of similar names to consider, because the port's own name is among them.
 _MAXIMUM_CANDIDATES = 5
@@ -59,16 +44,15 @@ def unconnected_ports(context: Context, kind: PortKind) -> Iterator[PortOfNode]:
     if not _is_fully_known(context):
         return
     connected, affected = context.once(_connected), context.once(_names_of_affected)
-    is_source = kind in _SOURCES.values()
     for channel in context.channels:
-        others = channel.sinks if is_source else channel.sources
+        others = channel.sinks if kind.is_source else channel.sources
         if others or channel.name in _EXTERNAL_TOPICS or channel.name in affected:
             continue
         for endpoint in channel.ends:
             port = endpoint.port
             if port.kind is not kind or port.external or port.required is False:
                 continue
-            if not (is_source and endpoint.key in connected):
+            if not (kind.is_source and endpoint.key in connected):
                 yield endpoint
 
 
@@ -159,7 +143,7 @@ def _nearest_names(_: Context) -> dict[tuple[str, str], str | None]:
 
 def _similar_names(context: Context, endpoint: PortOfNode) -> Iterator[str]:
     port = endpoint.port
-    counterpart = (COUNTERPARTS[port.kind], port.interface.value)
+    counterpart = (port.kind.counterpart, port.interface.value)
     nodes = context.once(_channel_names).get(counterpart, {})
     for name in vocabulary(tuple(nodes)).close(port.full_name, _MAXIMUM_CANDIDATES):
         if name != port.full_name and nodes[name] != {endpoint.node.name.value}:
@@ -291,7 +275,7 @@ def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
                 yield Diagnostic(
                     REQUIRED_PORT_UNCONNECTED,
                     f"port '{port_name(endpoint)}' must be connected, "
-                    f"but '{endpoint.port.full_name}' has no {COUNTERPARTS[endpoint.port.kind]}",
+                    f"but '{endpoint.port.full_name}' has no {endpoint.port.kind.counterpart}",
                     endpoint.node.name.span,
                     (Label(endpoint.port.name.span, "declared as required"),),
                     nearest_channel(context, endpoint),

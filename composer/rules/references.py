@@ -302,14 +302,6 @@ def _difference(earlier: Connection, later: Connection) -> str | None:
     return None
 
 
-#: For each kind of channel, the keys of a connection and the kinds of port they accept.
-_ENDS = {
-    ChannelKind.TOPIC: (("from", PortKind.PUBLISHER), ("to", PortKind.SUBSCRIPTION)),
-    ChannelKind.SERVICE: (("server", PortKind.SERVICE), ("clients", PortKind.CLIENT)),
-    ChannelKind.ACTION: (("server", PortKind.ACTION_SERVER), ("clients", PortKind.ACTION_CLIENT)),
-}
-
-
 def check_wrong_port_kind(context: Context) -> Iterator[Diagnostic]:
     """Check the endpoints of connections and the ports that reactions send through."""
     for connection in context.system.connections:
@@ -379,18 +371,19 @@ def _wrong_ports_of_connection(context: Context, connection: Connection) -> Iter
 
 def _slots(context: Context, connection: Connection) -> Iterator[_Slot]:
     groups = (connection.sources, connection.sinks)
-    for endpoints, (key, kind) in zip(groups, _ENDS[connection.kind], strict=True):
+    kind = connection.kind
+    for endpoints, key, expected in zip(groups, kind.keys_of_ends, kind.ends, strict=True):
         for endpoint in endpoints:
             port = context.system.port(endpoint)
             if port is not None:
-                yield _Slot(endpoint, key, kind, port)
+                yield _Slot(endpoint, key, expected, port)
 
 
 def _all_wrong(
     context: Context, connection: Connection, slots: list[_Slot], kind: ChannelKind
 ) -> Diagnostic:
     """Report one diagnostic for a connection whose endpoints are all wrong."""
-    (source_key, _), (sink_key, _) = _ENDS[connection.kind]
+    source_key, sink_key = connection.kind.keys_of_ends
     if kind is connection.kind:
         message = f"the endpoints of {kind} '{connection.name}' are swapped"
         hint = f"swap '{source_key}' and '{sink_key}'"
@@ -398,7 +391,7 @@ def _all_wrong(
         message = (
             f"'{connection.name}' connects the endpoints of {a(kind)}, not of {a(connection.kind)}"
         )
-        (source_key, _), (sink_key, _) = _ENDS[kind]
+        source_key, sink_key = kind.keys_of_ends
         hint = f"write '{kind}:', '{source_key}:' and '{sink_key}:'"
     labels = tuple(slot.label for slot in slots)
     subjects = connection_subjects(context.system, connection)
@@ -407,7 +400,7 @@ def _all_wrong(
 
 def _belongs(connection: Connection, actual: PortKind) -> str:
     if actual.channel is connection.kind:
-        other = next(key for key, kind in _ENDS[connection.kind] if kind is actual)
+        other = connection.kind.keys_of_ends[0 if actual.is_source else 1]
         return f"{a(actual)} belongs under '{other}'"
     return f"{a(actual)} belongs in a connection that starts with '{actual.channel}:'"
 

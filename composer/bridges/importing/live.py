@@ -6,13 +6,12 @@ from collections.abc import Collection, Iterable, Mapping
 
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.tree import Plain
-from composer.model import USE_SIM_TIME, ChannelKind, PortKind
+from composer.model import USE_SIM_TIME, PortKind
 from composer.model.names import is_selected, split_node_name, topic_name_problem
 from composer.model.qos import PRESETS, QosProfile
 from composer.model.resolve.parameters import rclpy_type
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
 
-_SOURCES = (PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER)
 #: Parameters that rclpy and rclcpp declare for each node.
 _OF_EVERY_NODE = ("start_type_description_service", "qos_overrides.")
 #: The primary states below active.
@@ -36,7 +35,7 @@ def describe_graph(
     """
     left_out: list[str] = []
     nodes = [node for node in snapshot.nodes if _is_selected(node, tuple(selected))]
-    ends = _channels(nodes)
+    ends = {(end.kind, end.name) for node in nodes for end in node.endpoints}
     found = []
     for node in nodes:
         if node.count > 1:
@@ -67,18 +66,9 @@ def _is_selected(node: ObservedNode, selected: tuple[str, ...]) -> bool:
     return not selected or any(is_selected(node.full_name, target) for target in selected)
 
 
-def _channels(nodes: Iterable[ObservedNode]) -> dict[tuple[ChannelKind, str], set[bool]]:
-    """Return for each channel which sides have an endpoint: True for publishers and servers."""
-    ends: dict[tuple[ChannelKind, str], set[bool]] = {}
-    for node in nodes:
-        for end in node.endpoints:
-            ends.setdefault((end.kind.channel, end.name), set()).add(end.kind in _SOURCES)
-    return ends
-
-
 def _ports(
     node: ObservedNode,
-    ends: Mapping[tuple[ChannelKind, str], set[bool]],
+    ends: Collection[tuple[PortKind, str]],
     known_types: Collection[str],
     left_out: list[str],
 ) -> Iterable[FoundPort]:
@@ -91,7 +81,7 @@ def _ports(
             left_out.append(f"{what}: its type {end.type} is not known here")
         elif (end.kind, end.name, end.qos) not in seen:
             seen.add((end.kind, end.name, end.qos))
-            is_alone = len(ends[end.kind.channel, end.name]) < 2
+            is_alone = (end.kind.counterpart, end.name) not in ends
             yield FoundPort(end.kind, end.name, end.type, _qos(end), external=is_alone)
 
 

@@ -34,12 +34,6 @@ from composer.model.resolve.qos import QosTable, implicit_qos
 
 T = TypeVar("T")
 
-_ENDPOINT_KEYS = {
-    ChannelKind.TOPIC: ("from", "to"),
-    ChannelKind.SERVICE: ("server", "clients"),
-    ChannelKind.ACTION: ("server", "clients"),
-}
-
 
 @dataclass(frozen=True, slots=True)
 class PortConnection:
@@ -127,7 +121,7 @@ def _connection(tree: Tree) -> Connection | None:
         return None
     kind = ChannelKind(entry.name)
     sources, sinks = (
-        tuple(Endpoint(name) for name in texts(tree.get(end))) for end in _ENDPOINT_KEYS[kind]
+        tuple(Endpoint(name) for name in texts(tree.get(end))) for end in kind.keys_of_ends
     )
     return Connection(
         kind,

@@ -46,7 +46,7 @@ NAMESPACES: tuple[Subject, ...] = (("key", "namespace"), ("key", "prefix"))
 #: A process may lack nodes, because it names what is not one.
 NODES_OF_PROCESSES: Subject = ("nodes of processes", "")
 
-_SOURCES = frozenset({PortKind.PUBLISHER, PortKind.SERVICE, PortKind.ACTION_SERVER})
+
 #: The kinds of things of which one mistake has many uses, which are reported together.
 _JOINED = frozenset(
     {"executor", "field", "node", "package", "process", "QoS profile", "renamed port", "variable"}
@@ -126,7 +126,7 @@ def connection_subjects(
     for end in connection.ends:
         node, port = system.node(end.node), system.port(end)
         is_source = end in connection.sources
-        is_right = port is not None and (port.kind in _SOURCES) is is_source
+        is_right = port is not None and port.kind.is_source is is_source
         if node is not None and port is not None and is_right and end not in wrong:
             found += _names_of_port(node, port)
         else:  # another port of that name, or of that node, may be meant
