@@ -12,7 +12,9 @@ only a ``/`` after ``~``.
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from fnmatch import fnmatchcase
+from itertools import chain, count
 
 #: rmw's limits in characters: the 255 of DDS minus the prefixes that ROS adds.
 MAXIMUM_NODE_NAME_LENGTH = 255
@@ -23,6 +25,12 @@ PROGRAM_LOGGER = "compose"
 
 _RULE_PREFIX = re.compile(r"(\w+:(?!//))?((rostopic|rosservice)://)?")
 _FOREIGN_CHARACTER = re.compile(r"[^A-Za-z0-9_]")
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return the name, with a number if it is taken."""
+    numbered = (f"{name}_{number}" for number in count(2))
+    return next(free for free in chain([name], numbered) if free not in taken)
 
 
 def node_name_problem(name: str) -> str | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion
@@ -77,7 +78,7 @@ def _executable_of_package(
 ) -> Iterator[Diagnostic]:
     if is_unresolved(package.value) or is_unresolved(name.value):
         return
-    if not _is_installed(context, package.value):
+    if not context.once(_installed)(package.value):
         return  # see executable_not_installed.py
     if find_executable(package.value, name.value, os.environ) is None:
         yield Diagnostic(
@@ -92,27 +93,13 @@ def _has_ros(_: Context) -> bool:
     return has_ros_packages(os.environ)
 
 
-def _is_installed(context: Context, package: str) -> bool:
+def _installed(_: Context) -> Callable[[str], bool]:
     """Return whether a package is installed; many nodes may name the same one."""
-    installed = context.once(_packages)
-    if package not in installed:
-        installed[package] = has_package(package, os.environ)
-    return installed[package]
+    return cache(lambda package: has_package(package, os.environ))
 
 
-def _packages(_: Context) -> dict[str, bool]:
-    return {}
-
-
-def _is_in_path(context: Context, program: str) -> bool:
-    programs = context.once(_programs_in_path)
-    if program not in programs:
-        programs[program] = find_program(program, Path(), os.environ) is not None
-    return programs[program]
-
-
-def _programs_in_path(_: Context) -> dict[str, bool]:
-    return {}
+def _in_path(_: Context) -> Callable[[str], bool]:
+    return cache(lambda program: find_program(program, Path(), os.environ) is not None)
 
 
 def _folder(executable: Executable) -> Path | None:
@@ -137,11 +124,11 @@ def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
         if executable.command:
             program = executable.command[0]
             is_path = "/" in program.value or is_unresolved(program.value)
-            if not is_path and not _is_in_path(context, program.value):
+            if not is_path and not context.once(_in_path)(program.value):
                 yield Diagnostic(NOT_INSTALLED, f"program '{program}' is not in PATH", program.span)
         elif package is None or is_unresolved(package.value) or not context.once(_has_ros):
             continue
-        elif not _is_installed(context, package.value):
+        elif not context.once(_installed)(package.value):
             yield Diagnostic(NOT_INSTALLED, f"package '{package}' is not installed", package.span)
 
 
@@ -249,7 +236,7 @@ def _plugin(context: Context, component: Component, plugin: Located[str]) -> Ite
                 plugin.span,
                 hint=suggestion(plugin.value, plugins),
             )
-        elif context.once(_has_ros) and not _is_installed(context, package.value):
+        elif context.once(_has_ros) and not context.once(_installed)(package.value):
             text = f"package '{package}' is not installed"
             yield Diagnostic(NOT_INSTALLED, text, package.span)
 

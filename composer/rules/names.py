@@ -10,6 +10,7 @@ from composer.language.rules import DUPLICATE_NAME
 from composer.model import Connection, Node, Port, System
 from composer.model.names import (
     MAXIMUM_NAMESPACE_LENGTH,
+    free_name,
     is_hidden,
     join,
     namespace_problem,
@@ -20,7 +21,7 @@ from composer.model.names import (
 )
 from composer.model.qos_overrides import PREFIX as QOS_OVERRIDES
 from composer.rules.analysis.context import Context, is_unresolved, location
-from composer.rules.analysis.formatting import a, free_name, safe_name
+from composer.rules.analysis.formatting import a, safe_name
 from composer.rules.analysis.subjects import connection_subjects, namespace_subjects
 
 INVALID_NAME = error("RC221", "invalid-name")
@@ -44,12 +45,10 @@ def check_invalid_node_name(context: Context) -> Iterator[Diagnostic]:
 def _check_node_name(name: Located[str], names: set[str]) -> Iterator[Diagnostic]:
     problem = node_name_problem(name.value)
     if problem is not None and not is_unresolved(name.value):
-        yield Diagnostic(
-            INVALID_NAME,
-            f"node name '{name}' {problem}",
-            name.span,
-            hint=f"rename it to '{free_name(safe_name(name.value), names)}'",
-        )
+        better = free_name(safe_name(name.value), names)
+        names.add(better)
+        message = f"node name '{name}' {problem}"
+        yield Diagnostic(INVALID_NAME, message, name.span, hint=f"rename it to '{better}'")
 
 
 def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
@@ -145,13 +144,11 @@ def check_invalid_parameter_name(context: Context) -> Iterator[Diagnostic]:
                 continue  # it has the name of a topic
             problem = parameter_name_problem(name.value)
             if problem is not None and not is_unresolved(name.value):
-                better = ".".join(safe_name(part) for part in name.value.split(".") if part)
-                yield Diagnostic(
-                    INVALID_NAME,
-                    f"parameter name '{name}' {problem}",
-                    name.span,
-                    hint=f"rename it to '{free_name(better, names)}'",
-                )
+                safe = ".".join(safe_name(part) for part in name.value.split(".") if part)
+                better = free_name(safe, names)
+                names.add(better)
+                message = f"parameter name '{name}' {problem}"
+                yield Diagnostic(INVALID_NAME, message, name.span, hint=f"rename it to '{better}'")
 
 
 def check_private_connection_name(context: Context) -> Iterator[Diagnostic]:

@@ -9,7 +9,6 @@ from typing import Any
 
 from composer.base.characters import escape_lines
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
-from composer.bridges.importing.writing import free_name
 from composer.language.document.scalars import NumberRefused, resolve_plain
 from composer.language.expressions import ExpressionError, compile_expression
 from composer.language.tree import Plain
@@ -24,7 +23,7 @@ from composer.launch.variants import (
     with_references,
 )
 from composer.model import LogLevel
-from composer.model.names import join_node_name, split_node_name
+from composer.model.names import free_name, join_node_name, split_node_name
 from composer.model.resolve.parameters import rclpy_type
 
 _PORTS = (

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
 
 from composer.base.characters import escape_lines, is_safe
@@ -17,6 +16,7 @@ from composer.language.document.writer import write_document
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
 from composer.launch.variants import with_references
 from composer.model import ChannelKind, PortKind
+from composer.model.names import free_name
 from composer.model.qos import PRESETS, QosProfile
 
 #: Presets that may describe a profile, the usual ones first.
@@ -176,12 +176,6 @@ def _key(text: str, whole: str = "") -> str:
     """Return ``text`` as the key of a port or node: a Python name."""
     key = _NOT_IN_KEYS.sub("_", text).strip("_") or _NOT_IN_KEYS.sub("_", whole).strip("_")
     return f"_{key}" if key[:1].isdigit() else key or "unnamed"
-
-
-def free_name(name: str, taken: Container[str]) -> str:
-    """Return the name, with a number if it is taken."""
-    numbered = (f"{name}_{number}" for number in itertools.count(2))
-    return next(free for free in itertools.chain([name], numbered) if free not in taken)
 
 
 def _map(content: dict[str, Plain], *, has_variables: bool = True) -> Mapping:

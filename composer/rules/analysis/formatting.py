@@ -6,7 +6,6 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain, count
 
 from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, shown
 from composer.model import PortKind, PortOfNode
@@ -75,14 +74,6 @@ def safe_name(name: str) -> str:
     )
     joined = re.sub("__+", "_", kept).strip("_")
     return f"n{joined}" if not joined or joined[0].isdigit() else joined
-
-
-def free_name(name: str, taken: set[str]) -> str:
-    """Return ``name``, with a number if it is already ``taken``; the result is then taken too."""
-    numbered = (f"{name}_{number}" for number in count(2))
-    free = next(found for found in chain((name,), numbered) if found not in taken)
-    taken.add(free)
-    return free
 
 
 def _without_accents(text: str) -> str:

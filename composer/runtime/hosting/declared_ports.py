@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
-from itertools import count
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
 from composer.behavior import TransitionFailed
 from composer.model import ChannelKind, Isolation, Node, Port, PortKind, Qos
-from composer.model.names import expand_name
+from composer.model.names import expand_name, free_name
 from composer.model.qos import PRESETS, QosProfile
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.ros.qos_profiles import own_profile
@@ -95,9 +94,11 @@ class DeclaredPorts:
         self, kind: PortKind, full_name: str, interface: str, profile: QosProfile
     ) -> Port:
         span = self.node.span
+        used = self.created | {port.name.value for port in self.node.ports}
+        name = free_name(full_name.strip("/"), used)  # counters are kept by name
         return Port(
             kind=kind,
-            name=Located(self._free_name(full_name.strip("/")), span),
+            name=Located(name, span),
             interface=Located(interface, span),
             ros_name=Located(full_name, span),
             full_name=full_name,
@@ -105,12 +106,6 @@ class DeclaredPorts:
             span=span,
             isolation=Isolation.COPY,
         )
-
-    def _free_name(self, name: str) -> str:
-        """Return ``name``, with a number if another port has it: counters are kept by name."""
-        numbered = (f"{name}_{number}" for number in count(2))
-        used = self.created | {port.name.value for port in self.node.ports}
-        return name if name not in used else next(item for item in numbered if item not in used)
 
 
 def report_undeclared(context: NodeContext, port: Port) -> None:
