@@ -155,14 +155,12 @@ def _restart_by_manager(ros: RosGraph, deadline: Deadline, name: str) -> str | N
     from composer.client.systems.managers import Systems
     from composer.client.systems.process_list import find_managed_nodes
 
-    systems = Systems(ros.session, deadline)
-    try:
-        ((system, nodes),) = find_managed_nodes(ros.session, deadline, systems, [name]).items()
+    with closing(Systems(ros.session, deadline)) as systems:
+        try:
+            ((system, nodes),) = find_managed_nodes(ros.session, deadline, systems, [name]).items()
+        except NotFoundError:
+            return None
         success, message = systems.restart(system, nodes)
-    except NotFoundError:
-        return None
-    finally:
-        systems.close()
     if not success:
         raise RequestError("rejected", message)
     return message
@@ -175,14 +173,11 @@ def command(values: Values, _: Dashboard) -> Prepared:
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         from composer.client.systems.managers import Systems
 
-        systems = Systems(ros.session, deadline)
-        try:
+        with closing(Systems(ros.session, deadline)) as systems:
             full_name = systems.find(system)
             if name == "shutdown":
                 return {"message": systems.shut_down(full_name)}
             success, message = systems.command(full_name, name)
-        finally:
-            systems.close()
         if not success:
             raise RequestError("rejected", f"{full_name}: {message}")
         return {"message": message}
