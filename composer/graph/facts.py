@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
-import math
 from collections.abc import Iterator, Mapping
 
 from composer.graph.diagram import Details
 from composer.graph.scene import SceneChannel, SceneEndpoint
+from composer.language.document.scalars import with_json_numbers
 from composer.language.tree import Plain
 from composer.model import (
     DEFAULT_EXECUTOR,
@@ -24,16 +24,6 @@ from composer.python_code.nodes import published_port
 from composer.python_code.syntax import Method
 from composer.rules.analysis.rates import causes_in_node, published_by_method
 
-_SOURCES = {
-    ChannelKind.TOPIC: "publishers",
-    ChannelKind.SERVICE: "servers",
-    ChannelKind.ACTION: "servers",
-}
-_SINKS = {
-    ChannelKind.TOPIC: "subscriptions",
-    ChannelKind.SERVICE: "clients",
-    ChannelKind.ACTION: "clients",
-}
 #: Statements that may leave a method early.
 _EXITS = (ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Assert)
 
@@ -76,6 +66,12 @@ def qos_facts(profile: QosProfile) -> dict[str, Plain]:
         if value is not None:
             facts[name] = value
     return facts
+
+
+def discovered_qos_facts(profile: QosProfile) -> dict[str, Plain]:
+    """Return the policies that discovery reports."""
+    unknown = ("history", "depth")
+    return {name: value for name, value in qos_facts(profile).items() if name not in unknown}
 
 
 def _history(profile: QosProfile) -> str:
@@ -126,10 +122,12 @@ def node_facts(node: Node, rates_hz: Mapping[str, float]) -> Details:
             {"name": timer.name.value, "rate_hz": timer_rate_hz(node, timer)}
             for timer in node.timers
         ],
-        "parameters": {
-            parameter.name.value: None if parameter.value is None else _json(parameter.value.value)
-            for parameter in (*node.parameters, *node.undeclared_parameters)
-        },
+        "parameters": with_json_numbers(
+            {
+                parameter.name.value: None if parameter.value is None else parameter.value.value
+                for parameter in (*node.parameters, *node.undeclared_parameters)
+            }
+        ),
     }
     return _non_empty(facts)
 
@@ -175,12 +173,15 @@ def port_facts(port: Port, rate_hz: float | None) -> Details:
 def channel_facts(channel: SceneChannel) -> Details:
     """Return the details of a topic, service or action."""
     types: list[Plain] = [*channel.types]
+    names = ("servers", "clients")
+    if channel.kind is ChannelKind.TOPIC:
+        names = ("publishers", "subscriptions")
     return _non_empty(
         {
             "name": channel.name,
             "type": types[0] if len(types) == 1 else types,
-            _SOURCES[channel.kind]: [*map(_end, channel.sources)],
-            _SINKS[channel.kind]: [*map(_end, channel.sinks)],
+            names[0]: [*map(_end, channel.sources)],
+            names[1]: [*map(_end, channel.sinks)],
         }
     )
 
@@ -191,17 +192,6 @@ def _end(endpoint: SceneEndpoint) -> str:
 
 def _non_empty(facts: dict[str, Plain]) -> Details:
     return tuple((name, value) for name, value in facts.items() if value not in (None, [], {}))
-
-
-def _json(value: Plain) -> Plain:
-    """Return ``value`` with YAML text for numbers that JSON does not have: ``.nan``, ``.inf``."""
-    match value:
-        case float() if not math.isfinite(value):
-            return str(value).replace("nan", ".nan").replace("inf", ".inf")
-        case list():
-            return [_json(item) for item in value]
-        case _:
-            return value
 
 
 def publishing_rates_hz(node: Node) -> dict[str, float]:

@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from composer.graph.diagram import Details, Problem, parent_of
-from composer.graph.facts import discovered_qos_label, qos_facts
+from composer.graph.facts import discovered_qos_facts, discovered_qos_label
 from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort
+from composer.language.document.scalars import with_json_numbers
 from composer.language.tree import Plain
 from composer.model import PortKind
 from composer.plan.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
@@ -95,9 +96,7 @@ def _endpoint_facts(endpoint: ObservedEndpoint, rate_hz: float | None) -> Detail
         "type": endpoint.type,
     }
     if endpoint.qos is not None:
-        # Discovery does not report history and depth.
-        policies = qos_facts(endpoint.qos).items()
-        facts["qos"] = {name: value for name, value in policies if name not in ("history", "depth")}
+        facts["qos"] = discovered_qos_facts(endpoint.qos)
     if rate_hz is not None:
         facts["rate_hz"] = rate_hz
     return tuple(facts.items())
@@ -110,5 +109,5 @@ def _facts(node: ObservedNode, ports: tuple[ScenePort, ...]) -> Details:
     if ports:
         facts["ports"] = [dict(port.details) for port in ports]
     if node.parameters:
-        facts["parameters"] = dict(node.parameters)
+        facts["parameters"] = with_json_numbers(node.parameters)
     return tuple(facts.items())

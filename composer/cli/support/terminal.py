@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import os
 import select
 import sys
@@ -227,22 +226,10 @@ def as_json(value: Any, *, indent: int | None = None) -> str:
     try:
         text = json.dumps(value, ensure_ascii=False, indent=indent, allow_nan=False)
     except ValueError:
-        text = json.dumps(_with_json_numbers(value), ensure_ascii=False, indent=indent)
+        from composer.language.document.scalars import with_json_numbers
+
+        text = json.dumps(with_json_numbers(value), ensure_ascii=False, indent=indent)
     return escape_json(text)
-
-
-def _with_json_numbers(value: Any) -> Any:
-    from composer.language.document.scalars import text_of_not_finite
-
-    match value:
-        case float() if not math.isfinite(value):
-            return text_of_not_finite(value)
-        case dict():
-            return {key: _with_json_numbers(item) for key, item in value.items()}
-        case list() | tuple():
-            return [_with_json_numbers(item) for item in value]
-        case _:
-            return value
 
 
 def truncated(value: Any, max_length: int) -> Any:

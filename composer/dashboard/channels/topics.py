@@ -11,7 +11,7 @@ from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update
-from composer.graph.facts import qos_facts
+from composer.graph.facts import discovered_qos_facts
 from composer.model import PortKind
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from composer.plan.drift import ObservedEndpoint
 
 _MAX_MEASURED = 40
-#: Discovery does not report these.
-_UNKNOWN_QOS = ("history", "depth")
 
 
 class TopicsFeed(Feed):
@@ -86,9 +84,7 @@ def _end(node: str, end: ObservedEndpoint) -> dict[str, Any]:
 
 def shown_qos(end: ObservedEndpoint) -> dict[str, Any] | None:
     """Return the policies of an endpoint that discovery reports."""
-    if end.qos is None:
-        return None
-    return {key: value for key, value in qos_facts(end.qos).items() if key not in _UNKNOWN_QOS}
+    return None if end.qos is None else discovered_qos_facts(end.qos)
 
 
 class ServicesFeed(Feed):

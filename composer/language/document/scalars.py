@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
+from typing import Any
 
 from composer.base.characters import INVISIBLE, UNSAFE, UNSAFE_IN_LINES
 from composer.base.diagnostics import Diagnostic
@@ -107,6 +108,19 @@ def resolve_any_number(text: str) -> ScalarValue:
 def text_of_not_finite(value: float) -> str:
     """Return NaN or an infinity as YAML writes it."""
     return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+
+
+def with_json_numbers(value: Any) -> Any:
+    """Return plain data with text for the numbers that JSON lacks."""
+    match value:
+        case float() if not math.isfinite(value):
+            return text_of_not_finite(value)
+        case dict():
+            return {key: with_json_numbers(item) for key, item in value.items()}
+        case list() | tuple():
+            return [with_json_numbers(item) for item in value]
+        case _:
+            return value
 
 
 def _integer(digits: str, base: int) -> int:

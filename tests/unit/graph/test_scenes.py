@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
-from composer.graph.diagram import Graph, Problem
+from composer.graph.diagram import Format, Graph, Problem
+from composer.graph.output import render
 from composer.graph.views import View, build_graph, live_scene_of, scene_of
 from composer.loading import load
 from composer.model import PortKind
@@ -129,5 +132,13 @@ def test_parameters_that_are_not_finite_are_yaml_text(tmp_path: Path) -> None:
     )
     system = load(tmp_path / "s.yaml").system
     assert system is not None
-    (vertex,) = build_graph(scene_of([system]), View.NODES).vertices
-    assert dict(vertex.details)["parameters"] == {"a": "-.inf", "b": [".nan", ".inf", 2.0]}
+    graph = build_graph(scene_of([system]), View.NODES)
+    (vertex,) = json.loads(render([graph], Format.JSON))["vertices"]
+    assert vertex["details"]["parameters"] == {"a": "-.inf", "b": [".nan", ".inf", 2.0]}
+
+
+def test_live_parameters_that_are_not_finite_are_yaml_text() -> None:
+    snapshot = Snapshot((ObservedNode("/n", parameters={"a": math.nan}),))
+    graph = build_graph(live_scene_of(snapshot, {}), View.NODES)
+    (vertex,) = json.loads(render([graph], Format.JSON))["vertices"]
+    assert vertex["details"]["parameters"] == {"a": ".nan"}
