@@ -21,7 +21,7 @@ from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
 from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit, read_node_type
-from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits
+from composer.model.assembly.limits import INVALID_INCLUDE, SystemLimits
 from composer.project import Project
 
 __all__ = [
@@ -96,7 +96,7 @@ def _assembled(
     project: Project, merge: Callable[[IncludeResolver], tuple[Mapping | None, SourceFile]]
 ) -> AssembledSystem:
     diagnostics = LimitedDiagnostics()
-    limits = IncludeLimits()
+    limits = SystemLimits([])
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
         merged, source = merge(resolver)

@@ -15,7 +15,7 @@ from composer.language.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.language.schema.kinds import SYSTEM, check_kind
 from composer.language.tree import Entry, Mapping, Tree
 from composer.language.tree_values import entries, is_opaque, text
-from composer.model.assembly.limits import INVALID_INCLUDE, IncludeLimits
+from composer.model.assembly.limits import INVALID_INCLUDE, SystemLimits
 from composer.model.assembly.namespacing import Placement
 from composer.model.names import namespace_problem
 from composer.project import OUTSIDE_HINT, Project
@@ -72,7 +72,7 @@ class IncludeReader:
     """Reads the files of one system, each once."""
 
     project: Project
-    limits: IncludeLimits
+    limits: SystemLimits
     diagnostics: list[Diagnostic]
     _files: dict[Path, SystemFile | None] = field(default_factory=dict)
 

@@ -18,7 +18,7 @@ from composer.language.schema.kinds import SYSTEM, with_intended_sections
 from composer.language.tree import Entry, LeftOut, Mapping, Tree, count_values, plain
 from composer.language.tree_values import entries, items, plain_text
 from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
-from composer.model.assembly.limits import IncludeLimits, exceeded
+from composer.model.assembly.limits import SystemLimits, exceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
 from composer.model.assembly.namespacing import PREFIXED, add_namespace
 from composer.model.assembly.references import (
@@ -57,7 +57,7 @@ class IncludeResolver:
     """
 
     reader: IncludeReader
-    limits: IncludeLimits
+    limits: SystemLimits
     diagnostics: list[Diagnostic]
     is_partial: bool = False
     folders: dict[str, Path] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from composer.language.rules import CYCLE
 from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
 from composer.language.tree import Mapping, count_values
 from composer.language.tree_values import text
-from composer.model.assembly.limits import UNKNOWN_BASE, IncludeLimits, exceeded
+from composer.model.assembly.limits import UNKNOWN_BASE, SystemLimits, exceeded
 from composer.model.assembly.merging import merge_maps
 from composer.project import Project
 from composer.project.node_types import NodeTypes
@@ -71,7 +71,7 @@ def inherit(file: NodeTypeFile) -> Inherited:
     """
     diagnostics: list[Diagnostic] = []
     files = [_with_intended_sections(file, diagnostics)]
-    limits = IncludeLimits()
+    limits = SystemLimits([])
     try:
         while (name := files[-1].base) is not None:
             base = _base(name, files, limits, diagnostics)
@@ -95,7 +95,7 @@ def _with_intended_sections(file: NodeTypeFile, diagnostics: list[Diagnostic]) -
 def _base(
     name: Located[str],
     files: list[NodeTypeFile],
-    limits: IncludeLimits,
+    limits: SystemLimits,
     diagnostics: list[Diagnostic],
 ) -> NodeTypeFile | None:
     """Return the file of the type ``name`` that the last of ``files`` extends."""

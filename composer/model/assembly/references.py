@@ -10,7 +10,7 @@ from typing import TypeAlias
 from composer.base.fast_dataclass import dataclass
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree, plain
 from composer.language.tree_values import changed_at, entries, items, mapping, plain_text
-from composer.model.assembly.limits import IncludeLimits
+from composer.model.assembly.limits import SystemLimits
 from composer.model.names import matches_wildcard
 
 WILDCARD = "*"
@@ -45,7 +45,7 @@ def with_prefix(name: Scalar, prefix: str) -> Scalar:
     return Scalar(f"{prefix}{name.value}", name.span, verbatim=False)
 
 
-def expand_references(tree: Mapping, left_out: Iterable[LeftOut], limits: IncludeLimits) -> Mapping:
+def expand_references(tree: Mapping, left_out: Iterable[LeftOut], limits: SystemLimits) -> Mapping:
     """Return a system with the names of nodes in place of patterns. Raises Stopped.
 
     Nodes that are left out go out of lists and of patterns. At the end of a connection, one of them
@@ -129,7 +129,7 @@ class _Wildcards:
 
     names: tuple[str, ...]
     absent: tuple[str, ...]
-    limits: IncludeLimits
+    limits: SystemLimits
     _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def nodes(self, tree: Tree) -> Tree:

@@ -10,13 +10,7 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import Located, Span
-from composer.language.document.limits import (
-    MAX_DECLARED_VALUES,
-    MAX_PASSED_SECTIONS,
-    TooManyErrors,
-)
-from composer.language.rules import TOO_LARGE
+from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Sequence, Tree
 from composer.language.tree_values import (
     choice,
@@ -44,6 +38,7 @@ from composer.model import (
     Transforms,
     UnknownKey,
 )
+from composer.model.assembly.limits import SystemLimits
 from composer.model.names import expand_name, remapped_name
 from composer.model.qos_overrides import override_names, with_overrides
 from composer.model.resolve.connections import PortConnection, PortConnections, connection_of
@@ -90,43 +85,7 @@ class SystemContext:
     use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
     processes: Map[str, Located[str]]  # by the nodes that they name
     diagnostics: list[Diagnostic]
-    declared: DeclaredValues
-
-
-@dataclass(slots=True)
-class DeclaredValues:
-    """What all nodes have, to limit it. Raises TooManyErrors beyond the limits.
-
-    ``values`` are keys and values that nodes declare; each node counts its node type again.
-    ``sections`` are the sections of parameter files that nodes get.
-    """
-
-    values: int = 0
-    sections: int = 0
-
-    def add(self, size: int, span: Span, diagnostics: list[Diagnostic]) -> None:
-        """Add the values of a node."""
-        self.values += size
-        if self.values > MAX_DECLARED_VALUES:
-            message = (
-                f"with this node, the nodes declare more than {MAX_DECLARED_VALUES:,} values, "
-                "counting expressions by their length"
-            )
-            raise _too_large(message, "split the system", span, diagnostics)
-
-    def add_sections(self, size: int, span: Span, diagnostics: list[Diagnostic]) -> None:
-        """Add the sections that a node gets."""
-        self.sections += size
-        if self.sections > MAX_PASSED_SECTIONS:
-            message = (
-                f"with this node, the nodes get more than {MAX_PASSED_SECTIONS:,} sections of "
-                "parameter files, counting each node again"
-            )
-            raise _too_large(message, "split the parameter files", span, diagnostics)
-
-
-def _too_large(message: str, hint: str, span: Span, diagnostics: list[Diagnostic]) -> TooManyErrors:
-    return TooManyErrors(diagnostics, Diagnostic(TOO_LARGE, message, span, hint=hint))
+    limits: SystemLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +112,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     else:
         made = _typed(type_entry, tree, context)
     declared = made.declaration
-    context.declared.add(declared.size, entry.key.span, context.diagnostics)
+    context.limits.count("declared", declared.size, entry.key.span)
     external = read_external(tree.entry("external"))
     is_passed_on = external is not None and not declared.only_declared
     gets_undeclared = declared.gets_undeclared or is_passed_on
@@ -172,8 +131,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         gets_undeclared=gets_undeclared,
         is_program=declared.implementation.executable is not None and external is None,
     )
-    size = parameters.sections_from_files
-    context.declared.add_sections(size, entry.key.span, context.diagnostics)
+    context.limits.count("sections", parameters.sections_from_files, entry.key.span)
     is_complete = made.complete and not declared.implementation.conflicting
     overridden = partial(with_overrides, overrides=parameters.qos_overrides)
     if transforms is not None:

@@ -41,12 +41,12 @@ from composer.model import (
     System,
     UnknownKey,
 )
+from composer.model.assembly.limits import SystemLimits
 from composer.model.hosts import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
 from composer.model.names import join
 from composer.model.recording import Recording
 from composer.model.resolve.connections import read_chains, read_connections
 from composer.model.resolve.node import (
-    DeclaredValues,
     SystemContext,
     resolve_node,
 )
@@ -187,7 +187,7 @@ def resolve_system(
         clock,
         processes_of_nodes(processes),
         diagnostics,
-        DeclaredValues(),
+        SystemLimits(diagnostics),
     )
     nodes = without_sections_of_others(
         [resolve_node(entry, context) for entry in entries(tree.get("nodes"))]
