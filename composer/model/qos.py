@@ -6,7 +6,7 @@ Policies and values are spelled as rclpy spells them; durations are in milliseco
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 
 from composer.base.fast_dataclass import dataclass
@@ -127,6 +127,24 @@ class Incompatibility:
     reason: str
 
 
+#: What an offer and a request of a policy must not be.
+_MISMATCHES: Mapping[str, tuple[StrEnum, StrEnum]] = {
+    "reliability": (Reliability.BEST_EFFORT, Reliability.RELIABLE),
+    "durability": (Durability.VOLATILE, Durability.TRANSIENT_LOCAL),
+    "liveliness": (Liveliness.AUTOMATIC, Liveliness.MANUAL_BY_TOPIC),
+}
+#: The policies that decide whether two endpoints match, and why they do not.
+DECIDING_POLICIES = {
+    "reliability": "the publisher does not send lost messages again",
+    "durability": "the publisher does not keep messages for late joiners",
+    "deadline_ms": "the publisher offers a longer deadline than the subscription requests",
+    "liveliness": "the publisher does not assert its liveliness manually",
+    "liveliness_lease_duration_ms": (
+        "the publisher may be silent for longer than the subscription allows"
+    ),
+}
+
+
 def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incompatibility, ...]:
     """Return all policies that prevent two endpoints from matching.
 
@@ -134,51 +152,19 @@ def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incom
     as strong. The rule comes from DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
     states it. History, depth and lifespan never matter.
     """
-    return tuple(_incompatibilities(offered, requested))
-
-
-def _incompatibilities(offered: QosProfile, requested: QosProfile) -> Iterator[Incompatibility]:
-    if (offered.reliability, requested.reliability) == (
-        Reliability.BEST_EFFORT,
-        Reliability.RELIABLE,
-    ):
-        reason = "the publisher does not send lost messages again"
-        yield _incompatibility("reliability", offered.reliability, requested.reliability, reason)
-    if (offered.durability, requested.durability) == (
-        Durability.VOLATILE,
-        Durability.TRANSIENT_LOCAL,
-    ):
-        reason = "the publisher does not keep messages for late joiners"
-        yield _incompatibility("durability", offered.durability, requested.durability, reason)
-    if _is_longer(offered.deadline_ms, requested.deadline_ms):
-        reason = "the publisher offers a longer deadline than the subscription requests"
-        yield _incompatibility("deadline_ms", offered.deadline_ms, requested.deadline_ms, reason)
-    if (offered.liveliness, requested.liveliness) == (
-        Liveliness.AUTOMATIC,
-        Liveliness.MANUAL_BY_TOPIC,
-    ):
-        reason = "the publisher does not assert its liveliness manually"
-        yield _incompatibility("liveliness", offered.liveliness, requested.liveliness, reason)
-    if _is_longer(offered.liveliness_lease_duration_ms, requested.liveliness_lease_duration_ms):
-        reason = "the publisher may be silent for longer than the subscription allows"
-        yield _incompatibility(
-            "liveliness_lease_duration_ms",
-            offered.liveliness_lease_duration_ms,
-            requested.liveliness_lease_duration_ms,
-            reason,
-        )
+    found = []
+    for policy, reason in DECIDING_POLICIES.items():
+        offer, request = getattr(offered, policy), getattr(requested, policy)
+        mismatch = _MISMATCHES.get(policy)
+        if _is_longer(offer, request) if mismatch is None else (offer, request) == mismatch:
+            found.append(Incompatibility(policy, _shown(offer), _shown(request), reason))
+    return tuple(found)
 
 
 def _is_longer(offered_ms: float | None, requested_ms: float | None) -> bool:
     if requested_ms is None:
         return False
     return offered_ms is None or offered_ms > requested_ms
-
-
-def _incompatibility(
-    policy: str, offered: str | float | None, requested: str | float | None, reason: str
-) -> Incompatibility:
-    return Incompatibility(policy, _shown(offered), _shown(requested), reason)
 
 
 def _shown(value: str | float | None) -> str:

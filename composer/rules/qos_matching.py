@@ -13,21 +13,19 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.resources import nodes_folder
 from composer.base.source import Span
 from composer.model import Channel, ChannelKind, Node, Port, PortOfNode
-from composer.model.qos import Incompatibility, QosProfile, incompatibilities, strictest
+from composer.model.qos import (
+    DECIDING_POLICIES,
+    Incompatibility,
+    QosProfile,
+    incompatibilities,
+    strictest,
+)
 from composer.rules.analysis.context import Context, location
 from composer.rules.analysis.formatting import listed, port_name
 
 QOS_INCOMPATIBLE = error("RC311", "qos-incompatible")
 OUTSIDE_QOS = warning("RC531", "outside-qos")
 
-#: The policies that decide whether two endpoints match.
-_POLICIES = (
-    "reliability",
-    "durability",
-    "deadline_ms",
-    "liveliness",
-    "liveliness_lease_duration_ms",
-)
 #: Reports about one profile; few topics have so many profiles that do not match it.
 _MAX_CONFLICTS = 10
 
@@ -83,7 +81,7 @@ def _by_profile(endpoints: Iterable[PortOfNode]) -> _Groups:
 
 
 def _policies(profile: QosProfile) -> tuple[object, ...]:
-    return tuple(getattr(profile, name) for name in _POLICIES)
+    return tuple(getattr(profile, name) for name in DECIDING_POLICIES)
 
 
 def _direction(
@@ -276,4 +274,5 @@ def _own_qos(node: Node, port: Port) -> Iterator[Diagnostic]:
 
 
 def _different_policies(first: QosProfile, second: QosProfile) -> tuple[str, ...]:
-    return tuple(name for name in _POLICIES if getattr(first, name) != getattr(second, name))
+    pairs = zip(DECIDING_POLICIES, _policies(first), _policies(second), strict=True)
+    return tuple(name for name, own, other in pairs if own != other)

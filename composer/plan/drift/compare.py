@@ -35,13 +35,8 @@ _NODES_HINT = "if its program creates them all, list their names under 'nodes' o
 #: States in which a node has its ports.
 _WITH_PORTS = ("inactive", "active")
 #: The policies that discovery reports for publishers and subscriptions; not history and depth.
-_DISCOVERED_POLICIES = (
-    "reliability",
-    "durability",
-    "deadline_ms",
-    "lifespan_ms",
-    "liveliness",
-    "liveliness_lease_duration_ms",
+_DISCOVERED_POLICIES = tuple(
+    policy for policy in QosProfile.__annotations__ if policy not in {"history", "depth"}
 )
 #: Policies that apply to publishers only.
 _PUBLISHERS_ONLY = ("lifespan_ms",)
