@@ -142,7 +142,7 @@ class Visitor:
             case Node():
                 return []
             case ExecuteProcess() | ExecuteLocal():
-                return [f"process: {self._command(entity)}"]
+                return [f"process: {' '.join(map(self._text, entity.cmd))}"]
             case RegisterEventHandler():
                 return [f"event handler: {type(entity.event_handler).__name__}"]
             case EmitEvent():
@@ -227,9 +227,6 @@ class Visitor:
                     "process": {"left_out": [], "ends_launch": False},
                 }
             )
-
-    def _command(self, entity: Any) -> str:
-        return " ".join(self._text(word) for word in entity.cmd)
 
     def _text(self, value: Any) -> str:
         return text_of(value, self._context)

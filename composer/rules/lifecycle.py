@@ -141,13 +141,10 @@ def check_silence_too_short(context: Context) -> Iterator[Diagnostic]:
         for name, limit in watch.topics:
             if name.value in known:
                 yield from _compare_silence(limit, *known[name.value])
-        if watch.silence_ms is not None and known and len(known) == _publisher_count(node):
+        publishers = node.ports_of(PortKind.PUBLISHER)
+        if watch.silence_ms is not None and known and len(known) == len(publishers):
             fastest = min(known.values(), key=lambda item: item[1])
             yield from _compare_silence(watch.silence_ms, *fastest)
-
-
-def _publisher_count(node: Node) -> int:
-    return len(node.ports_of(PortKind.PUBLISHER))
 
 
 def _compare_silence(

@@ -61,7 +61,7 @@ def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
     found = {
         location(namespace.span): namespace
         for namespace in namespaces
-        if _is_invalid(namespace.value)
+        if namespace_problem(namespace.value) is not None and not is_unresolved(namespace.value)
     }
     inside: dict[str, list[Node]] = {namespace.value: [] for namespace in found.values()}
     for node in system.nodes:
@@ -77,10 +77,6 @@ def check_invalid_namespace(context: Context) -> Iterator[Diagnostic]:
                 subjects=tuple(namespace_subjects(inside[namespace.value])),
             )
             inside[namespace.value] = []  # one diagnostic says which names are not known
-
-
-def _is_invalid(namespace: str) -> bool:
-    return namespace_problem(namespace) is not None and not is_unresolved(namespace)
 
 
 def _outer(namespace: str) -> Iterator[str]:

@@ -60,16 +60,13 @@ class QosConflict:
 
 def qos_conflicts(context: Context, channel: Channel) -> Iterator[list[QosConflict]]:
     """Yield the conflicts of a channel, those with the same cause together."""
-    if not (channel.sources and channel.sinks and _has_one_type(channel)):
+    types = {endpoint.port.interface.value for endpoint in channel.ends}
+    if not (channel.sources and channel.sinks and len(types) == 1):
         return  # another rule reports different types
     sources, sinks = _by_profile(channel.sources), _by_profile(channel.sinks)
     yield from _direction(context, sources, sinks)
     if channel.kind is not ChannelKind.TOPIC:
         yield from _direction(context, sinks, sources)
-
-
-def _has_one_type(channel: Channel) -> bool:
-    return len({endpoint.port.interface.value for endpoint in channel.ends}) == 1
 
 
 def _by_profile(endpoints: Iterable[PortOfNode]) -> _Groups:

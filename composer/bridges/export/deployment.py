@@ -216,12 +216,9 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    is_plain = _PLAIN.match(text) and text.lower() not in _NOT_TEXT and not _is_number(text)
+    is_number = text.startswith(".") and text[1:2].isdigit()
+    is_plain = _PLAIN.match(text) and text.lower() not in _NOT_TEXT and not is_number
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if is_plain else '"')
-
-
-def _is_number(text: str) -> bool:
-    return text.startswith(".") and text[1:2].isdigit()
 
 
 _Dumper.add_representer(str, _text)

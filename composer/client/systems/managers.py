@@ -281,7 +281,11 @@ class Systems:
         if self._with_callbacks:
             subscriptions.append(
                 self._stored_in(
-                    self._callbacks, name, CALLBACKS_TOPIC, CALLBACKS_QOS, _parse_timings
+                    self._callbacks,
+                    name,
+                    CALLBACKS_TOPIC,
+                    CALLBACKS_QOS,
+                    lambda text: decode(text, TimingReport, clean=visible),
                 )
             )
         return subscriptions
@@ -334,10 +338,6 @@ class _ProcessDeadline(Deadline):
     def has_process_ended(self) -> bool:
         """Whether the process has ended."""
         return self._is_local and not is_held(self._system)
-
-
-def _parse_timings(text: str) -> TimingReport:
-    return decode(text, TimingReport, clean=visible)
 
 
 def without_members(systems: Iterable[str]) -> list[str]:

@@ -59,7 +59,11 @@ class Diagram:
     def __init__(self, scene: Scene, view: View) -> None:
         graph = build_graph(_without_qos(scene) if view is View.NODES else scene, view)
         if view is View.DEPLOYMENT:
-            graph = replace(graph, clusters=tuple(map(_with_place_for_process, graph.clusters)))
+            labeled = (
+                replace(cluster, label=f"{cluster.label} · {PROCESS_PLACEHOLDER}")
+                for cluster in graph.clusters
+            )
+            graph = replace(graph, clusters=tuple(labeled))
         directions = tuple(Direction) if view in _TURNED else (graph.direction,)
         self._graph = graph
         self._layout_on = arrange_for_pages(graph, directions)
@@ -90,10 +94,6 @@ def _without_qos(scene: Scene) -> Scene:
         for node in scene.nodes
     )
     return replace(scene, nodes=tuple(nodes))
-
-
-def _with_place_for_process(cluster: Cluster) -> Cluster:
-    return replace(cluster, label=f"{cluster.label} · {PROCESS_PLACEHOLDER}")
 
 
 def _nodes_by_executor(graph: Graph) -> dict[str, list[str]]:

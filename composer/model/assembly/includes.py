@@ -82,7 +82,7 @@ class IncludeResolver:
         found += _without_emptied(check_schema(expanded, SYSTEM), tree)
         self.diagnostics += found
         includes = expanded.get(INCLUDE)
-        lines = _section_lines(INCLUDE, expanded)
+        lines = _lines_of_includes(expanded)
         if any(item.primary.line in lines and item.primary.file == file.source for item in found):
             self.is_partial = True
         all_left_out = [*left_out]
@@ -100,7 +100,7 @@ class IncludeResolver:
         # The copies of an include with an error may have the same names because of it, and an
         # entry with an error may differ from another one because of it.
         if not self.is_partial:
-            wrong = {_line(item) for item in self.diagnostics}
+            wrong = {(item.primary.file.path, item.primary.line) for item in self.diagnostics}
             self.diagnostics += (item for item in conflicts if not _lines(item) & wrong)
         self.left_out = tuple(all_left_out)
         whole = expand_references(joined, self.left_out, self.limits)
@@ -219,19 +219,15 @@ def _without_emptied(found: list[Diagnostic], written: Mapping) -> Iterator[Diag
             yield item
 
 
-def _line(diagnostic: Diagnostic) -> tuple[str, int]:
-    return diagnostic.primary.file.path, diagnostic.primary.line
-
-
 def _lines(conflict: Diagnostic) -> set[tuple[str, int]]:
     """Return the lines of the entries in conflict, as they are usually written."""
     spans = (conflict.primary, *(label.span for label in conflict.related))
     return {(span.file.path, span.line) for span in spans}
 
 
-def _section_lines(name: str, tree: Mapping) -> range:
-    """Return the lines of the section ``name`` of a file; none if it is not there."""
-    section = tree.entry(name)
+def _lines_of_includes(tree: Mapping) -> range:
+    """Return the lines of the section ``include`` of a file; none if it is not there."""
+    section = tree.entry(INCLUDE)
     if section is None:
         return range(0)
     start, file = section.key.span.line, section.key.span.file

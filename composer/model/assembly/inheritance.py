@@ -82,7 +82,8 @@ def inherit(file: NodeTypeFile) -> Inherited:
         return Inherited(None, [stopped.diagnostic], tuple(files))
     tree = files[-1].tree
     for child in reversed(files[:-1]):
-        tree = merge_maps(tree, _without_extends(child.tree))
+        own = (entry for entry in child.tree if entry.name != EXTENDS)
+        tree = merge_maps(tree, Mapping(tuple(own), child.tree.span))
     return Inherited(tree, diagnostics, tuple(files))
 
 
@@ -132,7 +133,3 @@ def _cycle(files: list[NodeTypeFile]) -> Diagnostic:
     through = f": {cycle}" if len(files) > 1 else ""
     message = f"node type '{names[0]}' extends itself{through}"
     return Diagnostic(CYCLE, message, spans[0], labels)
-
-
-def _without_extends(tree: Mapping) -> Mapping:
-    return Mapping(tuple(entry for entry in tree if entry.name != EXTENDS), tree.span)

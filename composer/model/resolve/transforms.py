@@ -36,7 +36,8 @@ def read_transforms(entry: Entry | None) -> Transforms | None:
     tree, span = entry.value, entry.key.span
     static = tuple(_static(item) for item in entries(tree.get("static")))
     dynamic = tuple(_dynamic(item) for item in entries(tree.get("dynamic")))
-    lookup = _lookup(tree.get("lookup"))
+    listed = tree.get("lookup")
+    lookup = Located(texts(listed), listed.span) if isinstance(listed, Sequence) else None
     ports = transform_ports(
         span,
         has_static=bool(static),
@@ -60,10 +61,6 @@ def merged_transforms(declared: Entry | None, given: Entry) -> Entry:
         frames |= {item.name: item for item in section.value}
         kept[section.name] = Entry(section.key, Mapping(tuple(frames.values()), section.value.span))
     return Entry(declared.key, Mapping(tuple(kept.values()), given.value.span))
-
-
-def _lookup(tree: Tree | None) -> Located[tuple[Located[str], ...]] | None:
-    return Located(texts(tree), tree.span) if isinstance(tree, Sequence) else None
 
 
 def _static(entry: Entry) -> StaticTransform:

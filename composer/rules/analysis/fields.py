@@ -27,8 +27,7 @@ from composer.interfaces.field_types.types import (
 )
 from composer.language.expressions import Expression
 from composer.language.templates import Constant, Items, Template
-from composer.language.tree import Plain
-from composer.model import Event, Node, Parameter, PeriodError, Port, Reaction, Timer
+from composer.model import Event, Node, PeriodError, Port, Reaction, Timer
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.expressions import (
     COMMON_NAMES,
@@ -121,7 +120,7 @@ def _node_names(node: Node, state: _NameTypes) -> _NameTypes:
         {
             item.name.value: ANYTHING
             if has_wrong_default(item) or wrong_choices(item)
-            else parameter_type(item.type.value, _choices(item))
+            else parameter_type(item.type.value, () if item.choices is None else item.choices.value)
             for item in node.parameters
         }
     )
@@ -129,10 +128,6 @@ def _node_names(node: Node, state: _NameTypes) -> _NameTypes:
     types |= {"parameters": parameters, "state": state}
     types |= {"count": INTEGER, "now": NUMBER, "node": STRING}
     return _NameTypes(types)
-
-
-def _choices(parameter: Parameter) -> tuple[Plain, ...]:
-    return () if parameter.choices is None else parameter.choices.value
 
 
 def _scope(context: Context, names: _NameTypes, event: Event, port: Port | None) -> _NameTypes:

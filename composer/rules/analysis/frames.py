@@ -208,7 +208,7 @@ def uses_of_behaviors(context: Context) -> tuple[tuple[Node, FrameUse], ...]:
     found: dict[object, tuple[FrameUse, ...]] = {}
     uses = []
     for node, source in behaviors(context):
-        if not _mentions_transforms(source):
+        if not any(".transforms" in module.source.text for module in source.own_modules):
             continue
         key = (id(source), node.transforms, tuple(sorted(_texts(node).items())))
         if key not in found:
@@ -270,10 +270,6 @@ def _tree(trees: dict[str, FrameTree], topic: str) -> FrameTree:
 
 def _is_known(*frames: Located[str]) -> bool:
     return not any(is_unresolved(frame.value) for frame in frames)
-
-
-def _mentions_transforms(source: BehaviorSource) -> bool:
-    return any(".transforms" in module.source.text for module in source.own_modules)
 
 
 def _texts(node: Node) -> Mapping[str, str]:

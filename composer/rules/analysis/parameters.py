@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from composer.base.diagnostics import shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
 from composer.language.tree import Plain
@@ -164,13 +165,9 @@ def describe(value: Plain) -> str:
         case float():
             return f"the double {value!r}"
         case str():
-            return f"the string '{_cut(value)}'"
+            return f"the string '{shown(value, limit=40)}'"
         case _:
             return "null" if value is None else "a list" if isinstance(value, list) else "a map"
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def _is_element(value: Plain, kind: str) -> bool:

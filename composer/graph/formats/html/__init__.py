@@ -145,7 +145,7 @@ def _short(name: str, value: Plain) -> str:
             ", ".join(_qos_policy(policy, policy_value) for policy, policy_value in value.items())
         )
     if isinstance(value, list):
-        return _list(value)
+        return "<ul>" + "".join(f"<li>{_scalar(item)}</li>" for item in value) + "</ul>"
     unit = _UNITS.get(name)
     return f"{_scalar(value)} {unit}" if unit else _scalar(value)
 
@@ -156,10 +156,6 @@ def _qos_policy(name: str, value: Plain) -> str:
     words, _, unit = name.partition("_ms")
     written = f"{value:g} ms" if isinstance(value, float) and name.endswith("_ms") else str(value)
     return f"{words.replace('_', ' ')}{unit} {written}"
-
-
-def _list(values: Sequence[Plain]) -> str:
-    return "<ul>" + "".join(f"<li>{_scalar(value)}</li>" for value in values) + "</ul>"
 
 
 def _scalar(value: Plain) -> str:
@@ -213,7 +209,7 @@ def _lines(graphs: Sequence[Graph], shown: int) -> Iterator[str]:
     yield f'<meta http-equiv="Content-Security-Policy" content="{_policy(script)}">'
     yield '<meta name="generator" content="compose graph">'
     yield f"<title>{title}</title>"
-    yield f"<style>{_style()}</style>"
+    yield f"<style>{page_style()}\n{_asset('page.css')}\n{_asset('picture.css')}</style>"
     yield "<noscript><style>.listing{display:block}.tools{display:none}</style></noscript>"
     yield "</head>"
     yield "<body>"
@@ -333,10 +329,6 @@ def _script() -> str:
     """Join the modules into one script: a page that is opened as a file cannot import modules."""
     parts = "\n".join(_MODULE_SYNTAX.sub("", _asset(name)) for name in _SCRIPTS)
     return f'(() => {{\n"use strict";\n{parts}}})();\n'
-
-
-def _style() -> str:
-    return f"{page_style()}\n{_asset('page.css')}\n{_asset('picture.css')}"
 
 
 def _asset(name: str) -> str:
