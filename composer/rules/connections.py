@@ -232,7 +232,7 @@ def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
 
 
 #: Names and patterns that ``recording`` lists and that are looked for; a file lists a few.
-_MAX_PATTERNS = 200
+_MAX_PATTERNS = 50
 
 
 def check_recorded_name(context: Context) -> Iterator[Diagnostic]:

@@ -17,6 +17,7 @@ from composer.base.diagnostics import (
     warning,
 )
 from composer.base.spelling import misspelled
+from composer.language.document.limits import MAX_ERRORS
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
 from composer.model.names import expand_name, remapped_name, topic_name_problem
 from composer.rules.analysis.context import Context, is_unresolved
@@ -75,6 +76,7 @@ _PRIVATE_OF_EVERY_NODE = frozenset(
 
 def check_unknown_remapping(context: Context) -> Iterator[Diagnostic]:
     """Check the name that each remapping replaces."""
+    compared = 0  # each takes a millisecond if there are many names
     for node in context.system.nodes:
         if not node.complete or any(is_unresolved(port.ros_name.value) for port in node.ports):
             continue
@@ -82,8 +84,11 @@ def check_unknown_remapping(context: Context) -> Iterator[Diagnostic]:
         names = tuple(port.ros_name.value for port in node.ports)
         for remapping in node.remappings:
             source = remapping.source
-            if _is_known(node, ports, remapping) or (
-                node.gets_undeclared and misspelled(source.value, names) is None
+            if _is_known(node, ports, remapping):
+                continue
+            compared += 1
+            if node.gets_undeclared and (
+                compared > MAX_ERRORS or misspelled(source.value, names) is None
             ):
                 continue
             yield Diagnostic(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import field
 from functools import partial
 from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree, plain
 from composer.language.tree_values import changed_at, entries, items, mapping, plain_text
 from composer.model.assembly.limits import SystemLimits
@@ -52,10 +53,9 @@ def expand_references(tree: Mapping, left_out: Iterable[LeftOut], limits: System
     stays if no other node is there: the connection would end nowhere. So does a container. Chains
     have no patterns, because their ports have an order.
     """
-    absent = tuple(item.name for item in left_out if item.section == "nodes")
-    wildcards = _Wildcards(
-        tuple(entry.name for entry in entries(tree.get("nodes"))), absent, limits
-    )
+    names = [entry.name for entry in entries(tree.get("nodes"))]
+    absent = [item.name for item in left_out if item.section == "nodes"]
+    wildcards = _Wildcards(dict.fromkeys(names), dict.fromkeys(absent), limits)
     for path in _NODES:
         tree = changed_at(tree, path, wildcards.nodes)
     for path in _PORTS:
@@ -127,10 +127,14 @@ class _Wildcards:
     matches stays: a rule reports the unknown node.
     """
 
-    names: tuple[str, ...]
-    absent: tuple[str, ...]
+    names: Collection[str]
+    absent: Collection[str]
     limits: SystemLimits
     _found: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    _absent_patterns: list[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._absent_patterns = [name for name in self.absent if WILDCARD in name]
 
     def nodes(self, tree: Tree) -> Tree:
         return _changed(tree, self._names)
@@ -155,23 +159,30 @@ class _Wildcards:
 
     def _matching(self, reference: Scalar, pattern: str, port: str) -> tuple[Scalar, ...]:
         if WILDCARD not in pattern:
-            is_absent = self.absent and pattern not in self.names and self._is_absent(pattern)
+            is_absent = pattern not in self.names and self._is_absent(pattern, reference.span)
             return () if is_absent else (reference,)
         span = reference.span
         if pattern not in self._found:
-            self.limits.count("comparisons", len(self.names) * (1 + len(pattern) // 64), span)
+            self._count_comparisons(pattern, self.names, span)
             self._found[pattern] = tuple(
                 name for name in self.names if matches_wildcard(pattern, name)
             )
         names = self._found[pattern]
         self.limits.count("matches", len(names), span)
-        if not names and self._is_absent(pattern):
+        if not names and self._is_absent(pattern, span):
             return ()
         return tuple(Scalar(f"{name}{port}", span, False) for name in names) or (reference,)
 
-    def _is_absent(self, pattern: str) -> bool:
+    def _is_absent(self, pattern: str, span: Span) -> bool:
         """Return whether a name or a pattern is one of a node that is left out."""
+        if pattern in self.absent:
+            return True
+        others = self.absent if WILDCARD in pattern else self._absent_patterns
+        self._count_comparisons(pattern, others, span)
         return any(
-            matches_wildcard(pattern, name) or matches_wildcard(name, pattern)
-            for name in self.absent
+            matches_wildcard(pattern, name) or matches_wildcard(name, pattern) for name in others
         )
+
+    def _count_comparisons(self, pattern: str, names: Collection[str], span: Span) -> None:
+        """Count what takes time. Raises Stopped."""
+        self.limits.count("comparisons", len(names) * (1 + len(pattern) // 64), span)

@@ -47,7 +47,6 @@ from composer.model.resolve.ports import (
 )
 from composer.model.resolve.qos import QosTable
 from composer.model.resolve.transforms import merged_transforms, read_transforms
-from composer.project import Project
 from composer.project.node_types import SourceFolders
 
 
@@ -104,7 +103,8 @@ def read_external(entry: Entry | None) -> External | None:
 
 def _reference(written: Located[str], folders: SourceFolders) -> BehaviorReference:
     folder = folders.folder(written.span)
-    return BehaviorReference(written, folder, Project.at(folder).node_folders)
+    node_folders = folders.node_types_for(written.span).project.node_folders
+    return BehaviorReference(written, folder, node_folders)
 
 
 def _executable(entry: Entry, tree: Mapping, folder: Path) -> Executable:
