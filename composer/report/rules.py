@@ -49,18 +49,14 @@ def select_diagnostics(
     selected, ignored = list(select), list(ignore)
     for text in [*selected, *ignored]:
         if not any(rule.matches(text) for rule in rules):
-            raise UnknownRule(text, _hint(text, rules))
+            names = (name for rule in rules for name in (rule.code, rule.name))
+            raise UnknownRule(text, suggestion(text, names, limit=0))
     return [
         diagnostic
         for diagnostic in diagnostics
         if (not selected or any(diagnostic.rule.matches(text) for text in selected))
         and not any(diagnostic.rule.matches(text) for text in ignored)
     ]
-
-
-def _hint(text: str, rules: Iterable[Rule]) -> str | None:
-    names = (name for rule in rules for name in (rule.code, rule.name))
-    return suggestion(text, names, limit=0)
 
 
 _PAGE = re.compile(

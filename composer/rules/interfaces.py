@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, error, nearest, shown
 from composer.base.source import shown_path
-from composer.interfaces import Action, Interfaces, InvalidDefinition, Message, Service
+from composer.interfaces import Interfaces, InvalidDefinition
 from composer.interfaces.index import similar_interface
 from composer.interfaces.sources import FOLDERS
 from composer.model import ChannelKind, Port
 from composer.model.interface_packages import how_to_build
-from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.context import KINDS_OF_INTERFACES, Context, is_unresolved
 from composer.rules.analysis.formatting import a
 from composer.rules.analysis.subjects import package_subjects
 
@@ -36,7 +36,7 @@ def check_unknown_interface(context: Context) -> Iterator[Diagnostic]:
                 hints[key] = _interface_hint(context, port)
             yield Diagnostic(
                 UNKNOWN_INTERFACE,
-                f"there is no {_type_word(port)} type '{name}'",
+                f"there is no {_type_word(port.kind.channel)} type '{name}'",
                 name.span,
                 hint=hints[key],
                 subjects=package_subjects(context.interfaces, name.value),
@@ -67,8 +67,8 @@ def invalid_definitions(interfaces: Interfaces, packages: Collection[str]) -> It
                     )
 
 
-def _type_word(port: Port) -> str:
-    return {"msg": "message"}.get(port.kind.channel.interface_folder, port.kind.channel.value)
+def _type_word(kind: ChannelKind) -> str:
+    return "message" if kind is ChannelKind.TOPIC else kind.value
 
 
 def _interface_hint(context: Context, port: Port) -> str | None:
@@ -93,29 +93,19 @@ def _interface_hint(context: Context, port: Port) -> str | None:
     return install if hint is None else f"{install}; {hint}"
 
 
-_EXPECTED = {
-    ChannelKind.TOPIC: "a message type",
-    ChannelKind.SERVICE: "a service type",
-    ChannelKind.ACTION: "an action type",
-}
-_KINDS = {
-    Message: ChannelKind.TOPIC,
-    Service: ChannelKind.SERVICE,
-    Action: ChannelKind.ACTION,
-}
-
-
 def check_wrong_interface_kind(context: Context) -> Iterator[Diagnostic]:
     """Check the kind of every port's type."""
     for node in context.system.nodes:
         for port in node.ports:
             found = context.interfaces.find(port.interface.value)
-            if found is None or _KINDS[type(found)] is port.kind.channel:
+            kind = port.kind.channel
+            actual = kind if found is None else KINDS_OF_INTERFACES[type(found)]
+            if actual is kind:
                 continue
             yield Diagnostic(
                 UNKNOWN_INTERFACE,
-                f"'{port.interface}' is {_EXPECTED[_KINDS[type(found)]]}, "
-                f"but {a(port.kind)} needs {_EXPECTED[port.kind.channel]}",
+                f"'{port.interface}' is {a(_type_word(actual))} type, "
+                f"but {a(port.kind)} needs {a(_type_word(kind))} type",
                 port.interface.span,
             )
 

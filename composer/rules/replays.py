@@ -18,7 +18,7 @@ from composer.language.document import parse_bytes
 from composer.language.document.limits import MAX_BYTES
 from composer.language.rules import OUT_OF_RANGE, UNREADABLE_FILE
 from composer.language.tree import plain
-from composer.model import ChannelKind, PortOfNode, channels
+from composer.model import Channel, ChannelKind, PortOfNode, channels
 from composer.model.names import matches_wildcard
 from composer.model.scenario import Replay
 from composer.rules.analysis.context import Context, is_unresolved
@@ -37,14 +37,6 @@ class Recorded:
     duration_s: float
     start_s: float = 0.0
     messages: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class _Topic:
-    """The endpoints of a topic in nodes that no bag replaces."""
-
-    publishers: tuple[PortOfNode, ...]
-    subscriptions: tuple[PortOfNode, ...]
 
 
 def check_replays(context: Context) -> Iterator[Diagnostic]:
@@ -77,10 +69,11 @@ def check_replays(context: Context) -> Iterator[Diagnostic]:
             yield from problems or _played(name, replay, recorded, topics)
 
 
-def _topics(context: Context, replaced: tuple[str, ...]) -> Mapping[str, _Topic]:
+def _topics(context: Context, replaced: tuple[str, ...]) -> Mapping[str, Channel]:
+    """Return the topics of the nodes that no bag replaces."""
     system = context.system.without_nodes(replaced)
     return {
-        channel.name: _Topic(channel.sources, channel.sinks)
+        channel.name: channel
         for channel in channels(system.nodes, with_transforms=True)
         if channel.kind is ChannelKind.TOPIC
     }
@@ -116,7 +109,7 @@ def _unknown_nodes(context: Context, replay: Replay) -> Iterator[Diagnostic]:
 
 
 def _listed(
-    replay: Replay, recorded: Recorded, topics: Mapping[str, _Topic]
+    replay: Replay, recorded: Recorded, topics: Mapping[str, Channel]
 ) -> Iterator[Diagnostic]:
     """Check the topics that are listed."""
     for pattern in replay.topics:
@@ -126,12 +119,12 @@ def _listed(
             yield Diagnostic(UNDECLARED_NAME, message, pattern.span, hint=hint)
         elif "*" in pattern.value:
             continue  # of these, what the system does not receive is not played
-        elif pattern.value not in topics or not topics[pattern.value].subscriptions:
-            received = [name for name, topic in topics.items() if topic.subscriptions]
+        elif pattern.value not in topics or not topics[pattern.value].sinks:
+            received = [name for name, topic in topics.items() if topic.sinks]
             message = f"no node subscribes to '{pattern}'"
             hint = suggestion(pattern.value, received)
             yield Diagnostic(UNDECLARED_NAME, message, pattern.span, hint=hint)
-        elif publishers := topics[pattern.value].publishers:
+        elif publishers := topics[pattern.value].sources:
             yield _conflict(pattern, publishers)
 
 
@@ -145,22 +138,22 @@ def _conflict(topic: Located[str], publishers: tuple[PortOfNode, ...]) -> Diagno
 
 
 def _played(
-    name: Located[str], replay: Replay, recorded: Recorded, topics: Mapping[str, _Topic]
+    name: Located[str], replay: Replay, recorded: Recorded, topics: Mapping[str, Channel]
 ) -> Iterator[Diagnostic]:
     """Check that something is played, and its types."""
     received = {
         topic: type_name
         for topic, type_name in recorded.types.items()
-        if replay.includes(topic) and topic in topics and topics[topic].subscriptions
+        if replay.includes(topic) and topic in topics and topics[topic].sinks
     }
-    played = {topic: item for topic, item in received.items() if not topics[topic].publishers}
+    played = {topic: item for topic, item in received.items() if not topics[topic].sources}
     if not played:
-        nodes = sorted({item for topic in received for item in _names(topics[topic].publishers)})
+        nodes = sorted({item for topic in received for item in _names(topics[topic].sources)})
         hint = f"'replace' nodes that publish topics of the bag: {', '.join(nodes)}"
         message = "the bag has no topic that the system receives and does not publish"
         yield Diagnostic(UNDECLARED_NAME, message, name.span, hint=hint if nodes else None)
     for topic, type_name in sorted(played.items()):
-        port = topics[topic].subscriptions[0].port
+        port = topics[topic].sinks[0].port
         if port.interface.value != type_name and not is_unresolved(port.interface.value):
             message = f"'{topic}' is {type_name} in the bag, and {port.interface} in the system"
             labels = (Label(port.interface.span, "declared here"),)

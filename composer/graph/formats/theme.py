@@ -98,7 +98,10 @@ def page_style() -> str:
 
     Every color is a variable (``--page``, ``--node-line``), for the rest of the page as well.
     """
-    light, dark = (_variables(colors(dark=side)) for side in (False, True))
+    light, dark = (
+        "".join(f"--{name}:{value};" for name, value in colors(dark=side).items())
+        for side in (False, True)
+    )
     names = {name: f"var(--{name})" for name in colors(dark=False)}
     return (
         f":root{{{light}}}"
@@ -107,7 +110,3 @@ def page_style() -> str:
         f"@media print{{:root:root{{{light}}}}}"
         f"{FORMS}{color_rules(names)}"
     )
-
-
-def _variables(values: Mapping[str, str]) -> str:
-    return "".join(f"--{name}:{value};" for name, value in values.items())

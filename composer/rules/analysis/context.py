@@ -23,10 +23,11 @@ from composer.python_code.nodes import ClassOfNode, NodeClass, node_classes, use
 
 T = TypeVar("T")
 
-_DEFINITIONS = {
-    ChannelKind.TOPIC: Message,
-    ChannelKind.SERVICE: Service,
-    ChannelKind.ACTION: Action,
+#: The kinds of channels that use each kind of definition.
+KINDS_OF_INTERFACES = {
+    Message: ChannelKind.TOPIC,
+    Service: ChannelKind.SERVICE,
+    Action: ChannelKind.ACTION,
 }
 
 
@@ -70,7 +71,8 @@ class Context:
     def interface(self, port: Port) -> Message | Service | Action | None:
         """Return the definition of a port's type; None if it is unknown or of another kind."""
         found = self.interfaces.find(port.interface.value)
-        return found if isinstance(found, _DEFINITIONS[port.kind.channel]) else None
+        is_of_kind = found is not None and KINDS_OF_INTERFACES[type(found)] is port.kind.channel
+        return found if is_of_kind else None
 
     def messages(self, port: Port | None) -> dict[str, Message]:
         """Return the messages of a port's type, by ``message``, ``goal`` and so on, if known."""
