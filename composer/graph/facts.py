@@ -18,7 +18,7 @@ from composer.model import (
     StaticTransform,
     Timer,
 )
-from composer.model.qos import PRESETS, History, QosProfile
+from composer.model.qos import DURATIONS, PRESETS, History, QosProfile
 from composer.python_code.lookup import find_behavior
 from composer.python_code.nodes import published_port
 from composer.python_code.syntax import Method
@@ -61,7 +61,7 @@ def qos_facts(profile: QosProfile) -> dict[str, Plain]:
     if profile.history is History.KEEP_LAST:
         facts["depth"] = profile.depth
     facts["liveliness"] = profile.liveliness.value
-    for name in ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms"):
+    for name in DURATIONS:
         value = getattr(profile, name)
         if value is not None:
             facts[name] = value

@@ -40,6 +40,16 @@ class Liveliness(StrEnum):
     MANUAL_BY_TOPIC = "manual_by_topic"
 
 
+#: The policies that are words, and those that are durations.
+WORDS: Mapping[str, type[StrEnum]] = {
+    "history": History,
+    "reliability": Reliability,
+    "durability": Durability,
+    "liveliness": Liveliness,
+}
+DURATIONS = ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms")
+
+
 @dataclass(frozen=True, slots=True)
 class QosProfile:
     """A complete QoS profile. The defaults are those of ``rclpy.qos.QoSProfile(depth=10)``."""

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from enum import StrEnum
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
 from composer.model.ports import Parameter, ParameterType, Port, PortKind, Qos
-from composer.model.qos import Durability, History, Liveliness, Reliability
+from composer.model.qos import DURATIONS, WORDS
 
 PREFIX = "qos_overrides."
 _NANOSECONDS = 1e6  # per millisecond
@@ -31,24 +30,15 @@ class _Policy:
     choices: tuple[str, ...] = ()
 
 
-def _choice(kind: type[StrEnum]) -> _Policy:
-    return _Policy(kind.__name__.lower(), kind, tuple(item.value for item in kind))
-
-
-def _duration(name: str) -> _Policy:
-    return _Policy(f"{name}_ms", lambda ns: ns / _NANOSECONDS if 0 < ns < _LONGEST_NS else None)
+def _milliseconds(nanoseconds: int) -> float | None:
+    return nanoseconds / _NANOSECONDS if 0 < nanoseconds < _LONGEST_NS else None
 
 
 #: ``avoid_ros_namespace_conventions`` is left out: nodes of a system have topics of ROS.
 _POLICIES: Mapping[str, _Policy] = {
-    "history": _choice(History),
     "depth": _Policy("depth", int),
-    "reliability": _choice(Reliability),
-    "durability": _choice(Durability),
-    "deadline": _duration("deadline"),
-    "lifespan": _duration("lifespan"),
-    "liveliness": _choice(Liveliness),
-    "liveliness_lease_duration": _duration("liveliness_lease_duration"),
+    **{name: _Policy(name, kind, tuple(map(str, kind))) for name, kind in WORDS.items()},
+    **{name.removesuffix("_ms"): _Policy(name, _milliseconds) for name in DURATIONS},
 }
 _OVERRIDABLE = {
     PortKind.PUBLISHER: tuple(_POLICIES),

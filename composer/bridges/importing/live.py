@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
 
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, PortKind
 from composer.model.names import is_selected, split_node_name, topic_name_problem
-from composer.model.qos import PRESETS, QosProfile
+from composer.model.qos import DURATIONS, PRESETS, QosProfile
 from composer.model.resolve.parameters import rclpy_type
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
 
@@ -96,14 +98,9 @@ def _qos(end: ObservedEndpoint) -> QosProfile | None:
 
 
 def _without_queue(profile: QosProfile) -> QosProfile:
-    return QosProfile(
-        reliability=profile.reliability,
-        durability=profile.durability,
-        deadline_ms=profile.deadline_ms or None,
-        lifespan_ms=profile.lifespan_ms or None,
-        liveliness=profile.liveliness,
-        liveliness_lease_duration_ms=profile.liveliness_lease_duration_ms or None,
-    )
+    default = QosProfile()
+    durations: dict[str, Any] = {name: getattr(profile, name) or None for name in DURATIONS}
+    return replace(profile, history=default.history, depth=default.depth, **durations)
 
 
 def _parameters(

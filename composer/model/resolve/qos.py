@@ -13,14 +13,7 @@ from composer.base.source import Located, Span
 from composer.language.tree import Entry, Mapping, Scalar, Tree
 from composer.language.tree_values import choice, entries, integer, is_opaque, key, number, text
 from composer.model import ChannelKind, NamedQos, Qos, QosReference
-from composer.model.qos import (
-    PRESETS,
-    Durability,
-    History,
-    Liveliness,
-    QosProfile,
-    Reliability,
-)
+from composer.model.qos import DURATIONS, PRESETS, WORDS, QosProfile
 
 
 @dataclass(slots=True)
@@ -149,12 +142,7 @@ def _duration(tree: Tree) -> Located[Any] | None:
 
 
 _POLICIES: Map[str, PolicyReader] = {
-    "history": partial(choice, kind=History),
     "depth": integer,
-    "reliability": partial(choice, kind=Reliability),
-    "durability": partial(choice, kind=Durability),
-    "deadline_ms": _duration,
-    "lifespan_ms": _duration,
-    "liveliness": partial(choice, kind=Liveliness),
-    "liveliness_lease_duration_ms": _duration,
+    **{name: partial(choice, kind=kind) for name, kind in WORDS.items()},
+    **dict.fromkeys(DURATIONS, _duration),
 }

@@ -9,7 +9,7 @@ from functools import partial
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.model import PortKind
-from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
+from composer.model.qos import DURATIONS, PRESETS, WORDS, QosProfile
 from composer.python_code.nodes import ClassOfNode, calls_on_self, passes_node_on
 from composer.python_code.scopes import NotLiteral, Scope
 from composer.python_code.trees import argument, dotted, span_of, walk
@@ -36,18 +36,7 @@ _QOS_NAMES = {
         f"rclpy.qos.QoSPresetProfiles.{preset.upper()}.value",
     )
 }
-#: The enumerations of rclpy's policies; each has two names.
-_POLICIES = {
-    "history": History,
-    "reliability": Reliability,
-    "durability": Durability,
-    "liveliness": Liveliness,
-}
-_DURATIONS = {
-    "deadline": "deadline_ms",
-    "lifespan": "lifespan_ms",
-    "liveliness_lease_duration": "liveliness_lease_duration_ms",
-}
+_DURATIONS = {name.removesuffix("_ms"): name for name in DURATIONS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +87,7 @@ def _overridable(scope: Scope, call: ast.Call) -> frozenset[str]:
         names = [item.attr.lower() for item in kinds.elts if isinstance(item, ast.Attribute)]
         if len(names) == len(kinds.elts):
             return frozenset(_DURATIONS.get(name, name) for name in names)
-    return frozenset({*_POLICIES, *_DURATIONS.values(), "depth"})
+    return frozenset({*WORDS, *_DURATIONS.values(), "depth"})
 
 
 def all_created_ports(node_class: ClassOfNode) -> list[CreatedPort] | None:
@@ -141,7 +130,7 @@ def _profile(scope: Scope, keywords: list[ast.keyword]) -> QosProfile:
         name = keyword.arg or ""
         if name == "depth":
             values[name] = scope.literal(keyword.value)
-        elif name in _POLICIES:
+        elif name in WORDS:
             values[name] = _policy(scope, name, keyword.value)
         elif name in _DURATIONS:
             values[_DURATIONS[name]] = _duration_ms(scope, keyword.value)
@@ -152,7 +141,7 @@ def _profile(scope: Scope, keywords: list[ast.keyword]) -> QosProfile:
 
 def _policy(scope: Scope, name: str, node: ast.expr) -> object:
     value = dotted(scope.followed(node)).rpartition(".")[2].lower()
-    kind = _POLICIES[name]
+    kind = WORDS[name]
     if value not in {item.value for item in kind}:
         raise NotLiteral(node)
     return kind(value)
