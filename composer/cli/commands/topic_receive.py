@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -191,7 +191,8 @@ def _subscription(
         strictest = topics.measuring_qos if measures else strictest_compatible
         offers = topics.offered_profiles(session, name)
         profile = with_policies(strictest(offers, topics.SUBSCRIPTION_DEPTH), policies)
-        with topics.TopicSubscription(session, name, message_type, profile, raw=raw) as found:
+        found = topics.TopicSubscription(session, name, message_type, profile, raw=raw)
+        with closing(found):
             yield found
 
 
@@ -209,7 +210,7 @@ def _messages(subscription: TopicSubscription, timeout_s: float | None) -> Itera
 
     limit_s = float("inf") if timeout_s is None else timeout_s
     while True:
-        received = subscription.take(Deadline(limit_s))
+        received = subscription.wait(Deadline(limit_s))
         if not received:
             raise subscription.no_message_error(limit_s)
         for item in received:
@@ -270,10 +271,10 @@ def hz(
         next_report, next_message = Deadline(_REPORT_EVERY_S), Deadline(silence_s)
         while left:
             wait = Deadline(min(next_report.left_s, next_message.left_s))
-            received = subscription.take(wait)
+            received = subscription.wait(wait)
             items = [item for item in received if _matches(expression, item.content)][:left]
             for item in items:
-                rates.add(item.at_s)
+                rates.add(item.received_ns * 1e-9)
             left -= len(items)
             unreported += len(items)
             if items:

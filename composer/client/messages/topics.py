@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -20,7 +20,7 @@ from composer.client.graph_names import full_name, type_mismatch_hint
 from composer.client.messages.values import Build, InvalidValueError, class_of
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.client.shared_session import SampledTopic
+from composer.client.shared_session import Sample, SampledTopic
 from composer.model.qos import Durability, QosProfile, strictest_compatible
 from composer.runtime.metrics.figures import MessageRate
 from composer.runtime.ros.qos_profiles import rclpy_profile
@@ -31,14 +31,6 @@ _ACKNOWLEDGED_WITHIN_S = 1
 
 class NotAcknowledgedError(RosError):
     """A reliable subscription has not acknowledged all messages in time."""
-
-
-@dataclass(frozen=True, slots=True)
-class Received:
-    """A message, or its serialized bytes, and when it arrived (seconds, time.monotonic)."""
-
-    content: Any
-    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,44 +49,31 @@ class Publication:
     wait_for: int = 0
 
 
-class TopicSubscription:
-    """A subscription that collects messages. Use it in a ``with`` block.
+#: A message has its time already, so it may wait: polling costs less than a wake-up for each.
+_POLL_PERIOD_S = 0.002
 
-    With ``raw``, the messages are serialized bytes.
-    """
+
+class TopicSubscription(SampledTopic):
+    """A subscription of a command."""
 
     def __init__(
         self, session: Session, topic: str, type_name: str, qos: QosProfile, *, raw: bool = False
     ) -> None:
+        super().__init__(session.node, topic, type_name, qos, raw=raw)
         self.topic = topic
         self._session = session
         self._type_name = type_name
-        self._received: deque[Received] = deque()
-        self._subscription = session.node.create_subscription(
-            class_of(type_name),
-            topic,
-            lambda content: self._received.append(Received(content, time.monotonic())),
-            rclpy_profile(qos),
-            raw=raw,
-        )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._session.node.destroy_subscription(self._subscription)
 
     def no_message_error(self, timeout_s: float) -> NoResponseError:
         """Return the error for a topic without messages, with the reason if it is known."""
         hint = type_mismatch_hint(self._session, "topic", self.topic, self._type_name)
         return NoResponseError(f"no message received on '{self.topic}' for {timeout_s:g} s", hint)
 
-    def take(self, deadline: Deadline) -> list[Received]:
-        """Return the collected messages; wait for the first one until the deadline."""
-        self._session.wait_for(lambda: self._received or None, deadline)
-        taken = list(self._received)
-        self._received.clear()
-        return taken
+    def wait(self, deadline: Deadline) -> list[Sample]:
+        """Return the messages that have arrived; wait for the first one until the deadline."""
+        while not (samples := self.take(SUBSCRIPTION_DEPTH)) and not deadline.passed:
+            time.sleep(min(_POLL_PERIOD_S, deadline.left_s))
+        return samples
 
 
 def offered_profiles(session: Session, topic: str) -> list[QosProfile]:
@@ -249,10 +228,6 @@ class RateWindow:
             deviation_s=statistics.pstdev(periods),
             window=len(periods),
         )
-
-
-#: A message has its time already, so it may wait: polling costs less than a wake-up for each.
-_POLL_PERIOD_S = 0.002
 
 
 def measure_rates(
