@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from composer.cli.support.completion import complete_node
+from composer.cli.commands.nodes import AnyNode
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Json, Timeout, examples
 from composer.cli.support.ros import ros_session
 from composer.cli.support.terminal import write_list
@@ -20,14 +20,7 @@ EPILOG = examples(
 
 
 def log_level(
-    node: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[NODE]",
-            help="The full name of a node, or its last part. Default: all nodes.",
-            autocompletion=complete_node,
-        ),
-    ] = None,
+    node: AnyNode = None,
     level: Annotated[
         LogLevel | None,
         typer.Argument(

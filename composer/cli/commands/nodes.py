@@ -28,6 +28,15 @@ NodeName = Annotated[
     ),
 ]
 
+AnyNode = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[NODE]",
+        help="The full name of a node, or its last part. Default: all nodes.",
+        autocompletion=complete_node,
+    ),
+]
+
 _NODE_SECTIONS = (
     ("Subscribers", "subscriptions"),
     ("Publishers", "publishers"),

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from composer.cli.commands.nodes import NodeName
-from composer.cli.support.completion import complete_node
+from composer.cli.commands.nodes import AnyNode, NodeName
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import (
     DEFAULT_TIMEOUT_S,
@@ -74,14 +73,7 @@ def _readable(
 
 @param_app.command("list", epilog=examples("compose param list planner", "compose param list"))
 def list_parameters(
-    node: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[NODE]",
-            help="The full name of a node, or its last part. Default: all nodes.",
-            autocompletion=complete_node,
-        ),
-    ] = None,
+    node: AnyNode = None,
     *,
     hidden: Hidden = False,
     json: Json = False,
