@@ -18,7 +18,7 @@ import typer
 from composer.cli.support.errors import FAILED, CommandError, UsageError, require_extra
 from composer.cli.support.options import examples, quantity
 from composer.cli.support.ros import require_interfaces, require_modules, require_ros
-from composer.cli.support.system_arguments import nearest_path, path_exists
+from composer.cli.support.system_arguments import check_exists
 from composer.cli.support.terminal import say, use_color, write, write_raw
 
 if TYPE_CHECKING:
@@ -167,10 +167,7 @@ def _loaded(paths: Sequence[Path]) -> list[LoadResult]:
     from composer.project.files import find_files
 
     for path in paths:
-        if not path_exists(path):
-            near = nearest_path(path)
-            hint = None if near is None else f"did you mean '{near}'?"
-            raise UsageError(f"there is no file or folder '{path}'", hint=hint)
+        check_exists(path)
     scenarios = []
     for path in find_files(paths).files:
         tree = read(path).tree

@@ -14,7 +14,7 @@ from composer.base.characters import counted
 from composer.base.fast_dataclass import dataclass
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import examples
-from composer.cli.support.system_arguments import path_exists
+from composer.cli.support.system_arguments import check_exists
 from composer.cli.support.terminal import lines, say, write
 
 if TYPE_CHECKING:
@@ -116,8 +116,7 @@ def _project(paths: Sequence[Path]) -> Project:
 
 def _folder(path: Path) -> Path:
     """Return a folder, or the folder of a file. Raises UsageError."""
-    if not path_exists(path):
-        raise UsageError(f"there is no file or folder '{path}'")
+    check_exists(path)
     try:
         return path if path.is_dir() else path.resolve().parent
     except (OSError, RuntimeError, ValueError) as error:

@@ -19,10 +19,7 @@ from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.name_values import complete_system_or_argument, split_arguments
 from composer.cli.support.options import examples
 from composer.cli.support.system_arguments import (
-    example_systems,
-    nearest_path,
-    path_exists,
-    project_systems,
+    check_exists,
 )
 from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
@@ -158,8 +155,8 @@ def _check(paths: Sequence[Path], stdin_name: str, arguments: Sequence[str]) -> 
     from composer.project.files import find_files
 
     for path in paths:
-        if path != _STDIN and not path_exists(path):
-            raise UsageError(f"there is no file or folder '{path}'", hint=_path_hint(path))
+        if path != _STDIN:
+            check_exists(path)
     found = find_files(path for path in paths if path != _STDIN)
     overrides = OverrideOptions(arguments=tuple(arguments))
     results = load_files(found.files, overrides)
@@ -193,15 +190,6 @@ def _explain(text: str) -> None:
     else:
         names = [name for item in rules for name in (item.code, item.name)]
         raise UsageError(f"there is no rule '{text}'", hint=suggestion(text, names))
-
-
-def _path_hint(path: Path) -> str | None:
-    """Return a hint with the path of the system of that name, or with a similar path."""
-    from composer.base.source import shown_path
-
-    named = example_systems() | project_systems()
-    close = named.get(str(path)) or nearest_path(path)
-    return None if close is None else f"did you mean '{shown_path(close)}'?"
 
 
 def _listed(paths: Sequence[Path]) -> str:

@@ -58,10 +58,8 @@ def write_file(path: Path, data: bytes) -> None:
         # Not resolve(), which raises RuntimeError for a link to itself: such a link is replaced.
         _write({Path(os.path.realpath(path)): data}, replace=True)
         return
-    try:
+    with _errors_of(path):
         path.write_bytes(data)
-    except OSError as error:
-        raise CommandError(f"cannot write '{path}': {error.strerror}") from error
 
 
 def _encoded(root: Path, files: Mapping[str, str | bytes]) -> dict[Path, bytes]:

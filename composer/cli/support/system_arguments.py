@@ -147,6 +147,17 @@ def path_exists(path: Path) -> bool:
         return True
 
 
+def check_exists(path: Path) -> None:
+    """Raise UsageError if there is no such path, with that of a system or a similar one."""
+    from composer.base.source import shown_path
+
+    if not path_exists(path):
+        named = example_systems() | project_systems()
+        close = named.get(str(path)) or nearest_path(path)
+        hint = None if close is None else f"did you mean '{shown_path(close)}'?"
+        raise UsageError(f"there is no file or folder '{path}'", hint=hint)
+
+
 def nearest_path(path: Path) -> Path | None:
     """Return the existing path most similar to ``path``, which does not exist, or None."""
     from composer.base.diagnostics import nearest
