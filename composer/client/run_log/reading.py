@@ -144,30 +144,38 @@ class RunReader:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._path: Path | None = None
-        self._lines: _LineReader | None = None
+        self._file: BinaryIO | None = None
+        self._incomplete = b""
 
     def new(self) -> Iterator[Record]:
         """Yield the records that have been written since the last call. Raises OSError."""
         while True:
             later = self._later_files()  # first: a file with a successor does not grow any more
-            if self._lines is not None:
-                for line in self._lines.lines():
-                    if (record := parse_line(line)) is not None:
-                        yield record
+            for line in self._lines():
+                if (record := parse_line(line)) is not None:
+                    yield record
             if not later:
                 return
             self.close()
             self._path = later[0]
             try:
-                self._lines = _LineReader(open_regular(self._path))
+                self._file = open_regular(self._path)
             except (FileNotFoundError, NotRegularError):  # the oldest file may just be removed
                 continue
 
     def close(self) -> None:
         """Close the file that is being read."""
-        if self._lines is not None:
-            self._lines.close()
-            self._lines = None
+        if self._file is not None:
+            self._file.close()
+        self._file, self._incomplete = None, b""
+
+    def _lines(self) -> Iterator[bytes]:
+        """Yield the lines since the last call; of a longer one than any record, the end."""
+        while self._file is not None and (part := self._file.readline(_MAX_LINE_BYTES)):
+            self._incomplete = (self._incomplete + part)[-_MAX_LINE_BYTES:]
+            if part.endswith(b"\n"):
+                line, self._incomplete = self._incomplete, b""
+                yield line
 
     def _later_files(self) -> list[Path]:
         files = log_files(self._run.folder)
@@ -187,26 +195,6 @@ def last_records(run: Run, max_bytes: int) -> list[Record]:
         if not max_bytes:
             break
     return [record for line in lines if (record := parse_line(line)) is not None]
-
-
-class _LineReader:
-    """Reads complete lines of a file that grows."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._incomplete = b""
-
-    def lines(self) -> Iterator[bytes]:
-        """Yield the lines since the last call; of a longer one than any record, the end."""
-        while part := self._file.readline(_MAX_LINE_BYTES):
-            self._incomplete = (self._incomplete + part)[-_MAX_LINE_BYTES:]
-            if part.endswith(b"\n"):
-                line, self._incomplete = self._incomplete, b""
-                yield line
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 _POLL_S = 0.1
