@@ -26,18 +26,17 @@ from composer.graph.scene import (
 )
 from composer.model import (
     DEFAULT_EXECUTOR,
-    DynamicTransform,
     Executor,
     ExecutorKind,
     ImplementationKind,
     Node,
     Port,
-    StaticTransform,
     System,
 )
 from composer.model.dependencies import dependency_edges
 from composer.plan import bring_up
 from composer.plan.drift.compare import states_after_bring_up
+from composer.rules.analysis.context import location
 from composer.rules.analysis.frames import kind_of, topic_of
 
 
@@ -103,7 +102,7 @@ def _scene_node(
             _scene_port(port, rates_hz.get(port.name.value), problems) for port in node.ports
         ),
         details=node_facts(node, rates_hz),
-        problem=problems.about_node(node),
+        problem=problems.about(_node_spans(node)),
     )
 
 
@@ -134,7 +133,7 @@ def _scene_port(port: Port, rate_hz: float | None, problems: _Problems) -> Scene
         qos=qos_label(port.qos.profile) if port.qos.explicit else "",
         rate_hz=rate_hz,
         details=port_facts(port, rate_hz),
-        problem=problems.about_port(port),
+        problem=problems.about(_port_spans(port)),
     )
 
 
@@ -147,7 +146,7 @@ def _transforms(node: Node, problems: _Problems) -> Iterator[SceneTransform]:
             kind=kind_of(item),
             node=node.full_name,
             details=transform_facts(item),
-            problem=problems.about_transform(item),
+            problem=problems.about((item.child.span, item.parent.span)),
         )
 
 
@@ -247,27 +246,12 @@ class _Problems:
             mark = Mark.WRONG if diagnostic.severity is Severity.ERROR else Mark.DOUBTFUL
             problem = Problem(f"{diagnostic.rule.code} {diagnostic.message}", mark)
             for span in (diagnostic.primary, *(label.span for label in diagnostic.related)):
-                place = _place(span)
+                place = location(span)
                 self._by_place[place] = worst((self._by_place.get(place), problem)) or problem
 
-    def about_port(self, port: Port) -> Problem | None:
-        """Return the diagnostic about a port's declaration, if there is one."""
-        return self._first(_port_spans(port))
-
-    def about_node(self, node: Node) -> Problem | None:
-        """Return the diagnostic about a node itself, if there is one."""
-        return self._first(_node_spans(node))
-
-    def about_transform(self, declared: StaticTransform | DynamicTransform) -> Problem | None:
-        """Return the diagnostic about the frames of a transform, if there is one."""
-        return self._first((declared.child.span, declared.parent.span))
-
-    def _first(self, spans: Iterable[Span]) -> Problem | None:
-        return worst(self._by_place.get(_place(span)) for span in spans)
-
-
-def _place(span: Span) -> tuple[str, int, int]:
-    return (span.file.path, span.line, span.column)
+    def about(self, spans: Iterable[Span]) -> Problem | None:
+        """Return the worst diagnostic at one of the spans of a thing, if there is one."""
+        return worst(self._by_place.get(location(span)) for span in spans)
 
 
 def _port_spans(port: Port) -> Iterator[Span]:

@@ -182,10 +182,6 @@ class Namespaces:
             namespace = parent_of(namespace)
         return namespace
 
-    def around_name(self, full_name: str) -> str:
-        """Return the innermost drawn namespace of the name of a topic, service or action."""
-        return self.around(parent_of(full_name))
-
 
 def parent_of(name: str) -> str:
     """Return the namespace of a full name."""

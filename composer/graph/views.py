@@ -76,7 +76,7 @@ def _channel_vertex(channel: SceneChannel, namespaces: Namespaces, scene: Scene)
             " / ".join(dict.fromkeys(map(short_type, channel.types))),
             *([] if measured is None else [rate(measured)]),
         ),
-        cluster=namespaces.around_name(channel.name),
+        cluster=namespaces.around(parent_of(channel.name)),
         namespace=parent_of(channel.name),
         details=channel_facts(channel),
         problem=Problem(f"more than one type: {', '.join(channel.types)}")

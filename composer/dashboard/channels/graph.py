@@ -91,11 +91,12 @@ class PictureFeed(Feed):
             self.poll_soon()
 
     def _laid_out(self, topology: Topology, states: Mapping[str, str | None]) -> Diagram:
-        from composer.dashboard.observing.diagrams import Diagram, declared_scene, live_scene
-        from composer.graph.views import View
+        from composer.dashboard.observing.diagrams import Diagram, live_scene
+        from composer.graph.views import View, scene_of
 
         if self._declared is not None:
-            return Diagram(declared_scene(self._declared), View(self._view))
+            scene = scene_of([self._declared.system], self._declared.diagnostics)
+            return Diagram(scene, View(self._view))
         return Diagram(live_scene(topology.snapshot(states)), View(self._view))
 
 

@@ -7,12 +7,11 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from composer.dashboard.declared import Declared
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex
 from composer.graph.formats.svg import contents, markers
 from composer.graph.layout import Size, arrange_for_pages
 from composer.graph.scene import Scene
-from composer.graph.views import View, build_graph, live_scene_of, scene_of
+from composer.graph.views import View, build_graph, live_scene_of
 from composer.model import PortKind
 from composer.plan.drift import Snapshot, is_manager
 
@@ -46,11 +45,6 @@ def live_scene(snapshot: Snapshot) -> Scene:
         if endpoint.kind is PortKind.PUBLISHER
     }
     return live_scene_of(replace(snapshot, nodes=nodes), rates_hz)
-
-
-def declared_scene(declared: Declared) -> Scene:
-    """Return the scene of a system as declared, with its diagnostics."""
-    return scene_of([declared.system], declared.diagnostics)
 
 
 class Diagram:

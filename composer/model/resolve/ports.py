@@ -74,14 +74,9 @@ def template(tree: Tree | None, diagnostics: list[Diagnostic]) -> Template | Non
     return compiled
 
 
-def has_reaction(tree: Mapping) -> bool:
-    """Return whether ``tree`` has any key of a reaction."""
-    return any(entry.name in KEYS for entry in tree)
-
-
 def reaction(tree: Tree | None, span: Span, diagnostics: list[Diagnostic]) -> Reaction | None:
     """Return the reaction that ``tree`` declares, or None."""
-    if not isinstance(tree, Mapping) or not has_reaction(tree):
+    if not isinstance(tree, Mapping) or not any(entry.name in KEYS for entry in tree):
         return None
     when = expression(tree.get("when"), diagnostics)
     log, level = _log(tree.get("log"), diagnostics)

@@ -10,7 +10,7 @@ from functools import cache, partial
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
 from composer.language.document.limits import LimitedDiagnostics
-from composer.language.tree import Entry, Mapping, Scalar, Tree
+from composer.language.tree import Entry, Mapping, Scalar
 from composer.language.tree_values import (
     choice,
     entries,
@@ -64,11 +64,6 @@ from composer.model.resolve.qos import qos_table
 from composer.project.node_types import SourceFolders
 
 
-def read_processes(tree: Tree | None) -> tuple[Process, ...]:
-    """Return the processes."""
-    return tuple(_process(entry) for entry in entries(tree))
-
-
 def processes_of_nodes(processes: Iterable[Process]) -> Map[str, Located[str]]:
     """Return the process of each node that a process names; the first one that does."""
     found: dict[str, Located[str]] = {}
@@ -90,11 +85,6 @@ def _process(entry: Entry) -> Process:
         memory_mb=number(tree.get("memory_mb")),
         host=text(tree.get("host")),
     )
-
-
-def read_hosts(tree: Tree | None) -> tuple[Host, ...]:
-    """Return the hosts."""
-    return tuple(_host(entry) for entry in entries(tree))
 
 
 def _host(entry: Entry) -> Host:
@@ -172,7 +162,7 @@ def resolve_system(
     written = tree.get("parameter_files")
     files = read_parameter_files(written, folders.home, folders.node_types.project, diagnostics)
     clock = _use_sim_time(tree, overrides)
-    processes = read_processes(tree.get("processes"))
+    processes = tuple(map(_process, entries(tree.get("processes"))))
     context = SystemContext(
         folders,
         namespace,
@@ -206,7 +196,7 @@ def resolve_system(
         qos_references=tuple(qos.references),
         executors=tuple(_executor(entry) for entry in entries(tree.get("executors"))),
         processes=processes,
-        hosts=read_hosts(tree.get("hosts")),
+        hosts=tuple(map(_host, entries(tree.get("hosts")))),
         discovery=read_discovery(tree.entry("discovery")),
         recording=read_recording(tree.entry("recording")),
         autostart=value_or(choice(lifecycle.get("autostart"), PrimaryState), PrimaryState.ACTIVE),
