@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partialmethod
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
@@ -33,6 +33,8 @@ from composer.runtime.hosting.ports.timers import HostedGuardCondition, HostedRa
 from composer.runtime.hosting.ports.topics import FirstMessage, HostedPublisher, HostedSubscription
 from composer.runtime.node.parameter_services import LoggerServices
 from composer.runtime.ros.messages import load_type_support
+
+T = TypeVar("T")
 
 #: Arguments of ``Node.__init__`` that have no effect on a hosted node or are taken over.
 _REFUSED = {
@@ -64,9 +66,9 @@ class AdoptedNode(Node):
             setattr(self, name, [])
         self._Node__waitables: list[Waitable] = []
         self._default_callback_group = MutuallyExclusiveCallbackGroup()
-        self._logger = instance.logger
+        self._logger = instance.settings.logger
         overrides = {item.name: item for item in options.get("parameter_overrides") or ()}
-        self._parameter_overrides = {**overrides, **instance.overrides}
+        self._parameter_overrides = {**overrides, **instance.settings.overrides}
         may_be_undeclared = bool(options.get("allow_undeclared_parameters"))
         self._allow_undeclared_parameters = may_be_undeclared
         lasting._allow_undeclared_parameters = may_be_undeclared
@@ -145,8 +147,7 @@ class AdoptedNode(Node):
             publisher_class=publisher_class,
             **options,
         )
-        self._begin(publisher, lambda instance: HostedPublisher(instance, publisher, events))
-        return publisher
+        return self._begun(publisher, HostedPublisher, events)
 
     def create_subscription(
         self,
@@ -169,30 +170,24 @@ class AdoptedNode(Node):
             event_callbacks=events,  # type: ignore[arg-type]
             **options,
         )
-        self._begin(
-            subscription, lambda instance: HostedSubscription(instance, subscription, events)
-        )
-        return subscription
+        return self._begun(subscription, HostedSubscription, events)
 
     def create_service(self, srv_type: Any, *arguments: Any, **options: Any) -> Service:
         """Create a service, as rclpy."""
         load_type_support(srv_type)
         service = super().create_service(srv_type, *arguments, **options)
-        self._begin(service, lambda instance: HostedService(instance, service))
-        return service
+        return self._begun(service, HostedService)
 
     def create_client(self, srv_type: Any, *arguments: Any, **options: Any) -> Any:
         """Create a client, as rclpy."""
         load_type_support(srv_type)
         client = super().create_client(srv_type, *arguments, **options)
-        self._begin(client, lambda instance: ClientPort(instance, client))
-        return client
+        return self._begun(client, ClientPort)
 
     def create_timer(self, *arguments: Any, **options: Any) -> Timer:
         """Create a timer, as rclpy."""
         timer = super().create_timer(*arguments, **options)
-        self._begin(timer, lambda instance: HostedTimerPort(instance, timer))
-        return timer
+        return self._begun(timer, HostedTimerPort)
 
     def create_rate(self, *arguments: Any, **options: Any) -> Rate:
         """Create a rate, as rclpy."""
@@ -268,17 +263,20 @@ class AdoptedNode(Node):
         else:
             instance.begin(action, HostedActionClient(instance, action, full_name))
 
-    def _begin(self, entity: Any, make_port: Callable[[Instance], Any]) -> None:
+    def _begun(self, entity: T, make_port: Callable[..., Any], *events: PendingQosEvents) -> T:
+        """Give an entity its port, and return it."""
         instance = self._composer_instance
         try:
-            port = make_port(instance)
+            port = make_port(instance, entity, *events)
         except BaseException:
-            super().destroy_publisher(entity)
-            super().destroy_subscription(entity)
-            super().destroy_service(entity)
+            created: Any = entity
+            super().destroy_publisher(created)
+            super().destroy_subscription(created)
+            super().destroy_service(created)
             raise
         declared = getattr(port, "port", None)
         instance.begin(entity, port, always_on=declared is not None and declared.always_on)
+        return entity
 
     def destroy_publisher(self, publisher: Any) -> bool:
         """Destroy a publisher of the instance."""
@@ -329,7 +327,7 @@ class AdoptedLifecycleNode(AdoptedNode, LifecycleNode):
 
     def _trigger(self, transition: str) -> TransitionCallbackReturn:
         """Request a transition. It runs later: a callback cannot wait for its own node."""
-        self._composer_instance.request(transition)
+        self._composer_instance.settings.request(transition)
         return TransitionCallbackReturn.SUCCESS
 
     trigger_configure = partialmethod(_trigger, "configure")
@@ -350,7 +348,7 @@ class _StateMachine:
     @property
     def current_state(self) -> tuple[int, str]:
         """The id and the label of the state."""
-        return self._instance.current_state()
+        return self._instance.settings.current_state()
 
 
 @cache
@@ -375,4 +373,4 @@ def is_managed(target: type[Node]) -> bool:
 def action_name(node: AdoptedNode, kind: PortKind, name: str) -> str:
     """Return the full name of an action, as the node declares, remaps or expands it."""
     expanded = Node.resolve_service_name(node, name, only_expand=True)
-    return node._composer_instance.action_names.get((kind, expanded), expanded)
+    return node._composer_instance.settings.action_names.get((kind, expanded), expanded)

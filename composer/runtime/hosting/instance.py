@@ -137,12 +137,7 @@ class Instance(UserCode):
         context, self._always_on_context = contexts
         super().__init__(context, settings.finish, may_block=settings.may_block)
         self.ports = ports
-        self.package = settings.package
-        self.overrides = settings.overrides
-        self.logger = settings.logger
-        self.action_names = settings.action_names
-        self.request = settings.request
-        self.current_state = settings.current_state
+        self.settings = settings
         self.entities = PortSet()
         #: The instance, once ``Node.__init__`` was called.
         self.node: Any = None

@@ -135,7 +135,7 @@ def _watched(
         place = _user_place(frame, walks=outside.walks)
         if outside.replacement is not None:
             instance = current_instance()
-            package = "" if instance is None else instance.package
+            package = "" if instance is None else instance.settings.package
             if package and (place or outside.walks or _package(frame) == package):
                 return outside.replacement(instance, *arguments, **options)
         is_new = bool(place) and (place, outside.name) not in places
