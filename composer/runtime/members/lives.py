@@ -168,6 +168,10 @@ class MemberLives:
                 is_child = life.child is not None
                 self.figures[node.node].take(node, report.host, is_started_here=is_child)
 
+    def warn(self, text: str) -> None:
+        """Log a warning about the process."""
+        self._context.write_log(LogLevel.WARN, PROGRAM_LOGGER, f"{self._label} {text}")
+
     def close(self) -> None:
         """Stop to check whether the process reports."""
         self._timer.cancel()
@@ -221,25 +225,29 @@ class MemberReports:
         self,
         name: str,
         context: MemberContext,
-        on_message: Callable[[str], None],
-        on_problem: Callable[[str], None],
+        lives: MemberLives,
+        ask_for_key: Callable[[], None],
+        on_report: Callable[[SystemReport, MemberLife], None],
     ) -> None:
         """``name`` is the namespace of the manager of the process.
 
-        ``on_message(text)`` receives what may be a report, to pass it to :meth:`read`.
-        ``on_problem(text)`` receives why reports cannot be read, once for each reason.
+        ``ask_for_key()`` asks the service of a process on another computer for its key. The reports
+        that count go to ``on_report``.
         """
         self._name = name
         self._context = context
-        self._on_message = on_message
-        self._on_problem = on_problem
+        self._lives = lives
+        self._ask_for_key = ask_for_key
+        self._on_report = on_report
         self._answered_key = ""  # of a process whose service was asked for it
         self._unsigned = ""  # the report for which it was asked
         self._problem = ""
         self._subscription = context.manager.create_subscription(
             String, f"{name}/{NAME}/{STATE_TOPIC}", lambda _: None, STATE_QOS
         )
-        context.loop.add_subscription(self._subscription, self._on_taken)
+        context.loop.add_subscription(
+            self._subscription, lambda taken: self._on_message(taken[0].data)
+        )
 
     @property
     def missing(self) -> str:
@@ -248,27 +256,6 @@ class MemberReports:
             return self._problem
         is_there = self._context.manager.count_publishers(self._subscription.topic_name)
         return "its reports do not arrive" if is_there else "it is not in the ROS graph"
-
-    def read(
-        self, text: str, life: MemberLife | None, ask_for_key: Callable[[], None]
-    ) -> tuple[SystemReport, str] | None:
-        """Return the report in a message with the key that has signed it, None if it is none.
-
-        ``life`` is the known life of the process. If it is on another computer, its service is
-        asked for the key.
-        """
-        if life is not None and is_signed(text, life.report_key):
-            return self._parsed(text, life.report_key)
-        if life is not None and life.child is not None:
-            return None
-        key_here = report_key(self._name)
-        key = self._answered_key if key_here is None else key_here
-        if is_signed(text, key):
-            return self._parsed(text, key)
-        if key_here is None:
-            self._unsigned = text
-            ask_for_key()
-        return None
 
     def on_key(self, key: str) -> None:
         """Use the key that the service has answered for the report for which it was asked."""
@@ -280,14 +267,33 @@ class MemberReports:
         self._context.loop.remove(self._subscription)
         self._context.manager.destroy_subscription(self._subscription)
 
-    def _on_taken(self, taken: tuple[String, Any]) -> None:
-        self._on_message(taken[0].data)
-
-    def _parsed(self, text: str, key: str) -> tuple[SystemReport, str] | None:
+    def _on_message(self, text: str) -> None:
+        key = self._key_of(text)
+        if not key:
+            return
         try:
-            return decode(split_signature(text)[1], SystemReport), key
+            report = decode(split_signature(text)[1], SystemReport)
         except ProtocolError as error:
             if str(error) != self._problem:
                 self._problem = str(error)
-                self._on_problem(f"reports what cannot be read: {error}")
-            return None
+                self._lives.warn(f"reports what cannot be read: {error}")
+            return
+        life = self._lives.of_report(report, key)
+        if life is not None and not report.is_starting:
+            self._on_report(report, life)
+
+    def _key_of(self, text: str) -> str:
+        """Return the key that has signed a message; empty if the process has not signed it."""
+        life = self._lives.current
+        if life is not None and is_signed(text, life.report_key):
+            return life.report_key
+        if life is not None and life.child is not None:
+            return ""
+        key_here = report_key(self._name)
+        key = self._answered_key if key_here is None else key_here
+        if is_signed(text, key):
+            return key
+        if key_here is None:
+            self._unsigned = text
+            self._ask_for_key()
+        return ""

@@ -15,9 +15,8 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.model import LogLevel, Process
+from composer.model import Process
 from composer.model.lifecycle import ACTIVE, FINALIZED, INACTIVE, PRIMARY_STATES
-from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.output import attribute_line, process_loggers
 from composer.runtime.executors.exceptions import printable
@@ -67,10 +66,12 @@ class MemberProcess:
             context.manager,
             context.loop,
             f"{self._name}/{NAME}/{REQUEST}",
-            on_report_key=self._on_report_key,
-            on_problem=self._warn,
+            on_report_key=lambda key: self._reports.on_key(key),  # noqa: PLW0108 - see below
+            on_problem=self._lives.warn,
         )
-        self._reports = MemberReports(self._name, context, self._on_report, self._warn)
+        self._reports = MemberReports(
+            self._name, context, self._lives, self.requests.ask_for_report_key, self._receive
+        )
 
     def add(self, member: MemberNode) -> None:
         """Add a node, in place of an earlier one of the same name."""
@@ -264,15 +265,6 @@ class MemberProcess:
 
     # --- reports
 
-    def _on_report(self, text: str) -> None:
-        found = self._reports.read(text, self._lives.current, self.requests.ask_for_report_key)
-        if found is None:
-            return
-        report, key = found
-        life = self._lives.of_report(report, key)
-        if life is not None and not report.is_starting:
-            self._receive(report, life)
-
     def _receive(self, report: SystemReport, life: MemberLife) -> None:
         has_returned = bool(life.lost) or (life.last is None and life.child is None)
         before = life.states
@@ -300,18 +292,12 @@ class MemberProcess:
         if done.exception() is None and done.result().success:
             life.answered[node] = done.result().report
 
-    def _on_report_key(self, key: str) -> None:
-        self._reports.on_key(key)
-
     def _fail(self, reason: str, is_expected: bool) -> None:
         self.requests.fail(ProcessUnavailable(reason))
         if not is_expected:
             with self._context.together():
                 for member in tuple(self._members.values()):
                     member.on_process_end(reason)
-
-    def _warn(self, text: str) -> None:
-        self._context.write_log(LogLevel.WARN, PROGRAM_LOGGER, f"{self} {text}")
 
     def _log(self, text: str, is_error: bool) -> None:
         loggers = process_loggers(self._process.name.value, self._members)
