@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
-from composer.runtime.executors.futures import Cancelled, Future, awaited_rclpy_future
+from composer.runtime.executors.futures import Awaited, Cancelled, Future, awaited_rclpy_future
 
 T = TypeVar("T")
 
@@ -201,6 +201,18 @@ def sleep(clock: SupportsCallLater, delay_s: float) -> Future[None]:
     timer = clock.call_later(delay_s, lambda: future.set_result(None))
     future.add_done_callback(lambda _: timer.cancel())
     return future
+
+
+async def wait_for(clock: SupportsCallLater, future: Awaited, timeout_s: float) -> bool:
+    """Wait for ``future`` for up to ``timeout_s`` seconds; return whether it is done."""
+    woken = sleep(clock, timeout_s)
+    future.add_done_callback(lambda _: woken.set_result(None))
+    try:
+        if not future.done():
+            await woken
+    finally:
+        woken.cancel()
+    return future.done()
 
 
 async def within(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from functools import partial
 from typing import Any
 
 from composer.model import Node
@@ -21,7 +19,7 @@ from composer.model.lifecycle import (
 from composer.plan import Condition
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.tasks import within
+from composer.runtime.executors.tasks import wait_for
 from composer.runtime.members.context import ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
 from composer.runtime.node.managed_node import TransitionOutcome
@@ -88,6 +86,10 @@ class MemberNode(OutsideNode):
     def has_finished(self) -> bool:
         """Whether its process reports that its program has ended itself, with exit status 0."""
         return self._has_finished
+
+    def leave(self) -> None:
+        """Leave the nodes of its process as they are, unless the process was started here."""
+        self._process.leave()
 
     def destroy(self) -> None:
         """Do nothing: the node belongs to its process."""
@@ -226,8 +228,7 @@ class MemberNode(OutsideNode):
         """Wait for the last report, with the final counters; the node is down without it, too."""
         left_s = math.inf if self._end_s is None else self._end_s - self.loop.clock.monotonic()
         wait_s = min(_REPORTED_WITHIN_S, left_s / 2.0)
-        with suppress(TimeoutError):
-            await within(self.loop, reported, max(0.0, wait_s))
+        await wait_for(self.loop, reported, max(0.0, wait_s))
 
     async def _wait_for(self, future: Future[Any]) -> None:
         """Wait while nodes of the process move: this one may have to wait for others.
@@ -243,10 +244,7 @@ class MemberNode(OutsideNode):
                 end_s = min(end_s, self._end_s)
             if self.loop.clock.monotonic() >= end_s:
                 raise ProcessUnavailable(f"{self._process} does not respond")
-            woken: Future[None] = Future()
-            future.add_done_callback(partial(_wake, woken))
-            with suppress(TimeoutError):
-                await within(self.loop, woken, end_s - self.loop.clock.monotonic())
+            await wait_for(self.loop, future, end_s - self.loop.clock.monotonic())
 
     def _on_settled(self) -> None:
         if self._state == FINALIZED:
@@ -338,7 +336,3 @@ class _LateReports:
     @property
     def are_enough(self) -> bool:
         return self._count > 1
-
-
-def _wake(sleeper: Future[None], _: object) -> None:
-    sleeper.set_result(None)

@@ -17,7 +17,7 @@ from composer.runtime.callbacks.log import severity
 from composer.runtime.children.command_line import remappings
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tasks import wait_for
 from composer.runtime.node.parameters import parameter_message
 from composer.runtime.outside_nodes.external_node import PERIOD_S
 from composer.runtime.outside_nodes.outside_node import (
@@ -216,9 +216,7 @@ class LoadedComponent(RemoteServices):
             left_s = end_s - self._clock.monotonic()
             if left_s <= 0.0:
                 raise NotAnswered(f"{self.container.full_name} is busy with another component")
-            turn = sleep(self._loop, left_s)
-            current.add_done_callback(partial(_wake, turn))
-            await turn
+            await wait_for(self._loop, current, left_s)
         try:
             yield
         finally:
@@ -270,10 +268,6 @@ class LoadedComponent(RemoteServices):
         """Unload a node, which need not be loaded. Raises NotAnswered."""
         request = _service("UnloadNode").Request(unique_id=unique_id)
         await self._ask(self._unloading, request, end_s)
-
-
-def _wake(turn: Future[None], _: object) -> None:
-    turn.set_result(None)
 
 
 def _load_request(node: Node, component: Component) -> _Message:

@@ -16,7 +16,7 @@ from composer.model.lifecycle import PRIMARY_STATES, TRANSITIONS
 from composer.model.names import join_node_name, split_node_name
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tasks import sleep, wait_for
 from composer.runtime.middleware.dds_participants import is_in_group
 from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
@@ -129,7 +129,6 @@ class NodePresence:
 #: An answer that a server sends before it has discovered the client is lost.
 _ASK_AGAIN_S = 1.0
 _POLL_S = 0.02
-_SOON_S = 0.02
 _EVENTS_DEPTH = 20
 _CONFIRMED_WITHIN_S = 5.0
 #: The states of a node in another process of the system in which each transition has nothing to do:
@@ -189,12 +188,8 @@ class RemoteServices:
         now_s = self._clock.monotonic()
         if now_s >= end_s:
             raise NotAnswered(f"{self._full_name} does not answer")
-        until_s = min(now_s + _ASK_AGAIN_S, end_s)
-        while not future.done() and self._clock.monotonic() < until_s:
-            await sleep(
-                self._loop, _POLL_S if self._clock.monotonic() > now_s + _SOON_S else _SOON_S / 4
-            )
-        return future.result() if future.done() else None
+        is_done = await wait_for(self._loop, future, min(_ASK_AGAIN_S, end_s - now_s))
+        return future.result() if is_done else None
 
 
 class RemoteLifecycle(RemoteServices):

@@ -19,9 +19,9 @@ from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.actions import GoalServer
 from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
-from composer.runtime.executors.futures import Cancelled, Future, wrap_future
+from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
-from composer.runtime.executors.tasks import sleep, within
+from composer.runtime.executors.tasks import sleep, wait_for
 from composer.runtime.intra_process.servers import LocalActionServer
 from composer.runtime.intra_process.taps import GoalTap
 from composer.runtime.ports import RunningPort
@@ -172,11 +172,7 @@ class ActionServerPort(RunningPort):
     async def drain(self) -> None:
         """Wait until the handlers have ended their goals; after a time limit, cancel them."""
         for goal in tuple(self._goals.values()):
-            try:
-                await within(
-                    self._context.loop, wrap_future(goal.ended, cancels=False), CANCEL_LIMIT_S
-                )
-            except TimeoutError:
+            if not await wait_for(self._context.loop, goal.ended, CANCEL_LIMIT_S):
                 self._context.log.warn(
                     f"{self._callback}: a goal did not end within {CANCEL_LIMIT_S:g} s, canceled"
                 )

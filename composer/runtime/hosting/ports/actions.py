@@ -12,9 +12,9 @@ from rclpy.action.server import RCLError as ActionError
 from composer.behavior import CallCancelled
 from composer.model import PortKind
 from composer.runtime.executors.exceptions import is_closing
-from composer.runtime.executors.futures import Cancelled, Future, wrap_future
+from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.strand import InlineStrand
-from composer.runtime.executors.tasks import within
+from composer.runtime.executors.tasks import wait_for
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.services import ServerInProcess, hosted_future
 from composer.runtime.hosting.user_code import UserFunction, call_in_group, interrupt_callbacks
@@ -68,9 +68,7 @@ class HostedActionServer(RunningPort):
             result = self._server._result_futures.get(bytes(goal.goal_id.uuid))
             if result is None or not goal.is_active:
                 continue
-            try:
-                await within(self._context.loop, wrap_future(result, cancels=False), CANCEL_LIMIT_S)
-            except TimeoutError:
+            if not await wait_for(self._context.loop, result, CANCEL_LIMIT_S):
                 self._context.log.warn(
                     f"action server '{self.name}': a goal did not end within {CANCEL_LIMIT_S:g} s"
                 )
