@@ -22,15 +22,7 @@ from rclpy.parameter import Parameter as RosParameter
 from composer.model import Parameter, ParameterType
 
 _ROS_TYPES: Mapping[str, RosParameter.Type] = {
-    ParameterType.BOOL: RosParameter.Type.BOOL,
-    ParameterType.INTEGER: RosParameter.Type.INTEGER,
-    ParameterType.DOUBLE: RosParameter.Type.DOUBLE,
-    ParameterType.STRING: RosParameter.Type.STRING,
-    ParameterType.BYTE_ARRAY: RosParameter.Type.BYTE_ARRAY,
-    ParameterType.BOOL_ARRAY: RosParameter.Type.BOOL_ARRAY,
-    ParameterType.INTEGER_ARRAY: RosParameter.Type.INTEGER_ARRAY,
-    ParameterType.DOUBLE_ARRAY: RosParameter.Type.DOUBLE_ARRAY,
-    ParameterType.STRING_ARRAY: RosParameter.Type.STRING_ARRAY,
+    kind: RosParameter.Type[kind.name] for kind in ParameterType
 }
 _LOWEST_INTEGER, _HIGHEST_INTEGER = -(2**63), 2**63 - 1
 _HIGHEST_DOUBLE = sys.float_info.max

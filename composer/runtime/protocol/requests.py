@@ -138,12 +138,6 @@ class ParametersQuery:
     Answer: ClassVar = ParametersAnswer
 
 
-QUERIES = (
-    *(GraphQuery, NodesQuery, DetailsQuery),
-    *(EndpointsQuery, StatusQuery, ParametersQuery),
-)
-
-
 # --- requests by the service
 
 

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, ParameterType, ParameterValue
+from rcl_interfaces.msg import ParameterDescriptor, ParameterValue
+from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 
+from composer.model import ParameterType
 from composer.runtime.protocol.requests import ParameterDescription
 
 NOT_SET = "not set"
-_TYPES = {
-    ParameterType.PARAMETER_NOT_SET: NOT_SET,
-    ParameterType.PARAMETER_BOOL: "bool",
-    ParameterType.PARAMETER_INTEGER: "integer",
-    ParameterType.PARAMETER_DOUBLE: "double",
-    ParameterType.PARAMETER_STRING: "string",
-    ParameterType.PARAMETER_BYTE_ARRAY: "byte_array",
-    ParameterType.PARAMETER_BOOL_ARRAY: "bool_array",
-    ParameterType.PARAMETER_INTEGER_ARRAY: "integer_array",
-    ParameterType.PARAMETER_DOUBLE_ARRAY: "double_array",
-    ParameterType.PARAMETER_STRING_ARRAY: "string_array",
+_TYPES = {RosParameter.Type.NOT_SET.value: NOT_SET} | {
+    RosParameter.Type[kind.name].value: kind.value for kind in ParameterType
 }
 
 

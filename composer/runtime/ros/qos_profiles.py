@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from enum import Enum
+from typing import Any, TypeVar
 
 from rclpy.duration import Duration
 from rclpy.qos import (
@@ -15,6 +16,8 @@ from rclpy.qos import (
 )
 
 from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
+
+P = TypeVar("P", bound=Enum)
 
 _NANOSECONDS = 1e6  # per millisecond
 #: Durations above are rmw's infinite duration: no limit.
@@ -37,29 +40,20 @@ def rclpy_profile(profile: QosProfile) -> QoSProfile:
 
 def discovered_profile(profile: QoSProfile) -> QosProfile:
     """Return the profile of a discovered endpoint. History and depth are usually not discovered."""
-    converted = QosProfile(
-        reliability=(
-            Reliability.BEST_EFFORT
-            if profile.reliability is ReliabilityPolicy.BEST_EFFORT
-            else Reliability.RELIABLE
-        ),
-        durability=(
-            Durability.TRANSIENT_LOCAL
-            if profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
-            else Durability.VOLATILE
-        ),
+    return QosProfile(
+        history=_policy(History, profile.history, History.KEEP_LAST),
+        reliability=_policy(Reliability, profile.reliability, Reliability.RELIABLE),
+        durability=_policy(Durability, profile.durability, Durability.VOLATILE),
         deadline_ms=_milliseconds(profile.deadline),
         lifespan_ms=_milliseconds(profile.lifespan),
-        liveliness=(
-            Liveliness.MANUAL_BY_TOPIC
-            if profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
-            else Liveliness.AUTOMATIC
-        ),
+        liveliness=_policy(Liveliness, profile.liveliness, Liveliness.AUTOMATIC),
         liveliness_lease_duration_ms=_milliseconds(profile.liveliness_lease_duration),
     )
-    if profile.history is HistoryPolicy.KEEP_ALL:
-        return replace(converted, history=History.KEEP_ALL)
-    return converted
+
+
+def _policy(kind: type[P], policy: Enum, default: P) -> P:
+    """Return a policy of rclpy as ours; the default if it is unknown or the system's default."""
+    return kind[policy.name] if policy.name in kind.__members__ else default
 
 
 def own_profile(profile: QoSProfile) -> QosProfile:
