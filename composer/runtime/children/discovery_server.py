@@ -23,12 +23,7 @@ from typing import TextIO
 
 from composer.model import Discovery, LogLevel
 from composer.model.names import PROGRAM_LOGGER
-from composer.runtime.children.child_processes import (
-    Child,
-    ChildProcesses,
-    Command,
-    signal_name,
-)
+from composer.runtime.children.child_processes import Child, ChildProcesses, Command
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.middleware.environment import active_variables
 from composer.runtime.process import StartRefused
@@ -291,7 +286,8 @@ class _Server:
 
     def close(self) -> None:
         """Record how the server has ended, and let others start it."""
-        if self._child is not None and _has_ended_in_order(self._child):
+        ended = None if self._child is None else self._child.ended
+        if ended is not None and ended.done() and not ended.cancelled() and ended.result() == 0:
             self._record.set_ended()
         self._record.close()
 
@@ -310,10 +306,11 @@ class _Server:
             self._timer = threading.Timer(RESTART_DELAY_S, self._restart)
             self._timer.daemon = True
             self._timer.start()
+        ended = f"{self} {child.how_ended or 'has ended'}"
         self._log(
             LogLevel.WARN,
-            f"{self} has ended{_how(child)}; the next one starts in {RESTART_DELAY_S:g} s. Nodes"
-            " that know each other still communicate",
+            f"{ended}; the next one starts in {RESTART_DELAY_S:g} s. Nodes that know each other"
+            " still communicate",
         )
 
     def _restart(self) -> None:
@@ -325,18 +322,6 @@ class _Server:
 
     def _log(self, level: LogLevel, text: str) -> None:
         self._write_log(level, PROGRAM_LOGGER, text)
-
-
-def _has_ended_in_order(child: Child) -> bool:
-    ended = child.ended
-    return ended.done() and not ended.cancelled() and ended.result() == 0
-
-
-def _how(child: Child) -> str:
-    if child.ended.cancelled():
-        return ""
-    status = child.ended.result()
-    return f" with status {status}" if status >= 0 else f" by {signal_name(-status)}"
 
 
 def _program() -> str:

@@ -162,7 +162,7 @@ def test_a_killed_server_is_replaced(port: int, shared_domain_id: int, tmp_path:
         before.wait_until_ready()
         (pid,) = servers(port)
         os.kill(pid, signal.SIGKILL)
-        system.wait_for("has ended by SIGKILL; the next one starts in 6 s")
+        system.wait_for("was ended by SIGKILL; the next one starts in 6 s")
         count, _ = before.ask()
         until_s = time.monotonic() + PATIENCE_S
         while before.ask()[0] < count + 20:  # a second of messages
