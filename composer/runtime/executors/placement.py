@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
 from composer.model import Executor, ExecutorKind, Process
+from composer.runtime.process.computer import process_usage
 
 _PRIORITY_HINT = (
     "it is allowed to root, with CAP_SYS_NICE, or up to the 'rtprio' of the user in"
     " /etc/security/limits.conf"
 )
-_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
-_MEGABYTE = 1e6
 #: Python's default is 5 ms.
 _SWITCH_INTERVAL_S = 0.001
 
@@ -48,11 +46,11 @@ def memory_excess(process: Process) -> str | None:
     limit = process.memory_mb
     if limit is None:
         return None
-    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
-    used_mb = int(pages) * _PAGE_BYTES / _MEGABYTE
-    if used_mb <= limit.value:
+    usage = process_usage("self")
+    if usage is None or usage.memory_mb <= limit.value:
         return None
-    return f"process '{process.name}' uses {used_mb:.0f} MB of memory, more than {limit.value:g} MB"
+    used = f"process '{process.name}' uses {usage.memory_mb:.0f} MB of memory"
+    return f"{used}, more than {limit.value:g} MB"
 
 
 def place_threads(executor: Executor, native_thread_ids: Iterable[int]) -> tuple[str, ...]:

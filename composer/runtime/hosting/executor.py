@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.task import Future as RclpyFuture
 
 from composer.runtime.executors.futures import Awaited
+from composer.runtime.executors.loop import NodeExecutor
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.user_code import UserCode, UserFunction
@@ -17,7 +18,7 @@ from composer.runtime.hosting.user_code import UserCode, UserFunction
 _OTHERS = frozenset({"composer", "rclpy"})
 
 
-class InstanceExecutor:
+class InstanceExecutor(NodeExecutor):
     """The part of ``rclpy.executors.Executor`` that classes use.
 
     While a task blocks, others run. It is reported and interrupted as a callback is.
@@ -30,10 +31,9 @@ class InstanceExecutor:
         spin_once: Callable[[float | None], None],
     ) -> None:
         """``spin`` waits for a future, ``spin_once`` for the end of a callback."""
+        super().__init__(code.context.loop)
         self._code = code
         self._context = code.context  # by which a task on a stack is recognized
-        #: That of the ROS node, which rclpy's own functions use.
-        self._of_rclpy: Any = code.context.node.executor
         self._spin = spin
         self._spin_once = spin_once
 
@@ -47,11 +47,10 @@ class InstanceExecutor:
 
         An exception is one of the future, and an error of the node.
         """
-        if str(getattr(callback, "__module__", None)).partition(".")[0] in _OTHERS:
-            task: RclpyFuture = self._of_rclpy.create_task(callback, *arguments, **options)
-            return task
         if isinstance(callback, Coroutine):
             function = UserFunction(self._code, lambda: callback)
+        elif str(getattr(callback, "__module__", None)).partition(".")[0] in _OTHERS:
+            return super().create_task(callback, *arguments, **options)
         else:
             function = UserFunction(self._code, partial(callback, *arguments, **options))
         function.__name__ = name_of(callback).rpartition(".")[2]
@@ -75,15 +74,6 @@ class InstanceExecutor:
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait until a callback has ended, or for a time."""
         self._spin_once(timeout_sec)
-
-    def wake(self) -> None:
-        """Do nothing: entities are served once they are created."""
-
-    def add_node(self, node: object) -> None:
-        """Do nothing: the composer serves the node."""
-
-    def remove_node(self, node: object) -> None:
-        """Do nothing: the node is served until it is cleaned up."""
 
 
 def fail(future: RclpyFuture, error: BaseException) -> None:

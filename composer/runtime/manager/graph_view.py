@@ -12,10 +12,11 @@ from typing import Any
 
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.loop import Loop
+from composer.runtime.manager.publishing import ReportPublisher
 from composer.runtime.middleware.dds_participants import count_participants
 from composer.runtime.node.parameter_services import ParameterServices, count_items
 from composer.runtime.process.query_socket import Answer
-from composer.runtime.protocol.reports import SystemReport, TimingReport
+from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import (
     KINDS,
     DetailsAnswer,
@@ -177,15 +178,13 @@ class ManagerQueries:
         loop: Loop,
         graph: GraphObserver,
         parameters: Callable[[], Mapping[str, tuple[Loop, ParameterServices]]],
-        report: Callable[[], SystemReport],
-        timings: Callable[[], TimingReport],
+        reports: ReportPublisher,
     ) -> None:
         """``parameters()`` returns the loop and the parameters of each node, by full name."""
         self._loop = loop
         self._graph = graph
         self._parameters = parameters
-        self._report = report
-        self._timings = timings
+        self._reports = reports
 
     def answers(self) -> Mapping[type[Any], Answer]:
         """Return the answers by the types of queries."""
@@ -199,10 +198,10 @@ class ManagerQueries:
         }
 
     def _status(self, query: StatusQuery) -> SystemReport:
-        report = self._report()
+        report = self._reports.report()
         if not query.callbacks:
             return report
-        timed = self._timings()
+        timed = self._reports.timings()
         return replace(
             report, callbacks=timed.callbacks, chains=timed.chains, callbacks_at_s=timed.at_s
         )

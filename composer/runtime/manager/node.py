@@ -126,13 +126,7 @@ class ManagerNode:
         if context.report_key:
             self._member = MemberService(self._loop, context, self._reports, self._log.info)
         self._graph = GraphObserver(changes, own_participant)
-        queries = ManagerQueries(
-            self._loop,
-            self._graph,
-            self._parameter_services,
-            self._reports.report,
-            self._reports.timings,
-        )
+        queries = ManagerQueries(self._loop, self._graph, self._parameter_services, self._reports)
         self._query_socket: QuerySocket | None = None
         if not status.clock.is_isolated:
             if status.clock.is_virtual:

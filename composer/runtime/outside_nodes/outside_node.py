@@ -18,6 +18,7 @@ from composer.model.lifecycle import (
     last_transition,
 )
 from composer.model.names import split_node_name
+from composer.runtime.callbacks.log import logger_name
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Cancelled
@@ -77,7 +78,7 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         ManagedLifecycle.__init__(self)
         self.lifecycle = self
         self._listener = context.listener
-        self._logger = model.full_name.strip("/").replace("/", ".")
+        self._logger = logger_name(model.full_name)
         self._state = UNCONFIGURED
         self._end_s: float | None = None
         #: Whether it is not there, and its return will be reported.

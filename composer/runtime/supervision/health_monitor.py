@@ -9,6 +9,7 @@ from types import FrameType
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState
 from composer.plan import Fault, FaultKind
+from composer.runtime.callbacks.log import logger_name
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.supervision.events import Stuck
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
@@ -159,7 +160,7 @@ class HealthMonitor:
                 self._reported.add((node, callback.name))
                 # Once: it may be meant to, or it may hang.
                 text = f"{callback.name} has not returned for {lasts_s:.0f} s; it is at"
-                logger = self._context.full_name(node).strip("/").replace("/", ".")
+                logger = logger_name(self._context.full_name(node))
                 self._context.reporter.log(LogLevel.WARN, logger, f"{text} {callback.location()}")
             return
         if observed.interrupted_s is None:
