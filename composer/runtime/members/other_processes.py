@@ -80,11 +80,6 @@ class OtherProcesses:
             for process in processes:
                 process.requests.release()
 
-    def leave(self) -> None:
-        """Leave those alone that were not started here: another process coordinates them."""
-        for process in self._all:
-            process.leave()
-
     def limit_end(self) -> None:
         """Let the next requests be the last ones of the processes that were started here."""
         for process in self._all:

@@ -202,6 +202,9 @@ class ManagedNode(ABC):
     def block(self) -> None:
         """Block all ports of a failed node until its next transition."""
 
+    def leave(self) -> None:
+        """Leave it in its state from now on, if it was not started here: another system uses it."""
+
     def limit_end(self, end_s: float) -> None:
         """Let nothing last longer than ``end_s``: the system shuts down."""
 

@@ -20,7 +20,6 @@ from composer.runtime.metrics.figures import chain_figures, figures
 from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameters import ParameterError
-from composer.runtime.outside_nodes.external_node import ExternalNode
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
@@ -200,10 +199,8 @@ class NodeSet:
 
     def leave_others(self) -> None:
         """Leave nodes alone that were not started here. Thread-safe."""
-        self.other_processes.leave()
         for node in tuple(self.nodes.values()):
-            if isinstance(node, ExternalNode):
-                node.leave()
+            node.leave()
 
     def limit_end(self, end_s: float) -> None:
         """Pass on that the system shuts down until ``end_s`` (monotonic)."""
