@@ -65,7 +65,7 @@ class Progress:
             return
         if isinstance(event, BroughtUp):
             address = None if self._address is None or self._ready is None else self._address()
-            text = str(event) if address is None else f"{address}\n{event}"
+            text = event.with_reasons if address is None else f"{address}\n{event.with_reasons}"
             report_ready(self._ready, text, is_complete=event.is_complete)
             self._ready = None
         line = self._line(event)

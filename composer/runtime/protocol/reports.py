@@ -198,11 +198,18 @@ class SystemReport:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What keeps nodes from being up, in words."""
+        return self.missing_nodes(reasons=True)
+
+    def missing_nodes(self, *, reasons: bool) -> tuple[str, ...]:
+        """Return which nodes are not up, in words; with the reasons of those that have failed."""
         missing = (Condition.ABSENT, STARTING)
         absent = [node.node for node in self.nodes if node.condition in missing]
         down = [node for node in self.nodes if node.held_down and node.node not in absent]
         waiting = [f"waiting for {_listed(absent)}"] if absent else []
-        failed = [f"{node.node} is {node.condition or 'down'}: {node.held_down}" for node in down]
+        failed = [
+            f"{node.node} is {node.condition or 'down'}" + f": {node.held_down}" * reasons
+            for node in down
+        ]
         more = [f"{len(down) - _MAX_LISTED} more are down"] if len(down) > _MAX_LISTED else []
         return (*waiting, *failed[:_MAX_LISTED], *more)
 

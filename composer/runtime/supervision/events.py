@@ -114,9 +114,10 @@ class Commanded:
 
 @dataclass(frozen=True, slots=True)
 class BroughtUp:
-    """The bring-up is over; ``remarks`` are about nodes that are not up.
+    """The bring-up is over; ``remarks`` are about nodes that are not up, with the reasons.
 
-    ``is_complete``: all nodes that the system needs are.
+    ``is_complete``: all nodes that the system needs are. ``missing`` are the remarks without the
+    reasons: the log has them already.
     """
 
     elapsed_s: float
@@ -124,10 +125,19 @@ class BroughtUp:
     nodes: int
     remarks: tuple[str, ...] = ()
     is_complete: bool = True
+    missing: tuple[str, ...] = ()
 
     def __str__(self) -> str:
+        return self._with(self.missing)
+
+    @property
+    def with_reasons(self) -> str:
+        """The line for those who do not see the log."""
+        return self._with(self.remarks)
+
+    def _with(self, remarks: tuple[str, ...]) -> str:
         active = f"{self.active} of {self.nodes} nodes active after {self.elapsed_s:.2f} s"
-        return ", ".join((active, *self.remarks))
+        return ", ".join((active, *remarks))
 
 
 @dataclass(frozen=True, slots=True)

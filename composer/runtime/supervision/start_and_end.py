@@ -62,8 +62,10 @@ class SystemStart:
         if problem is None and not self.context.main_queue.stopping:
             status = self.context.status.snapshot()
             active, nodes = self.context.node_set.active(), len(self.context.node_set.nodes)
+            missing = status.missing_nodes(reasons=False)
             is_complete = not status.failed
-            self.context.reporter.report(BroughtUp, active, nodes, status.remarks, is_complete)
+            details = active, nodes, status.remarks, is_complete, missing
+            self.context.reporter.report(BroughtUp, *details)
         return problem
 
     def _wait_for_processes(self, within_s: float) -> None:

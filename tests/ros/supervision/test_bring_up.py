@@ -76,6 +76,7 @@ def test_a_node_that_does_not_come_up_stops_only_those_that_depend_on_it(
     with running(robot(policy, required=required), tmp_path, driver=DRIVER) as system:
         (up,) = system.reported(BroughtUp)
         assert up.is_complete is (required == "false")
+        assert NOT_READY not in str(up), "the log has the reason already"
         wait_until(lambda: system.node("driver").state == "unconfigured", "the end of restarts")
         restarts = 2 if policy == "restart" else 0
         wait_until(lambda: len(system.reported(NodeFailed)) == restarts + 1, "the last failure")
