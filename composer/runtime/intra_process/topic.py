@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any
 
@@ -80,6 +80,14 @@ class LatchedMessages:
         """Return the messages, the oldest first."""
         since_s = self._monotonic() - self._lifespan_s
         return [message for at_s, message in self._kept if at_s > since_s]
+
+    def take(self) -> Iterator[Any]:
+        """Yield the messages, the oldest first, and forget each."""
+        since_s = self._monotonic() - self._lifespan_s
+        while self._kept:
+            at_s, message = self._kept.popleft()
+            if at_s > since_s:
+                yield message
 
 
 class LocalPublisher(GatedPublisher):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Coroutine, Iterator
-from math import inf
 from typing import Any, cast
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -18,6 +16,7 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.mutation_check import RememberingTarget
 from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.intra_process.publisher import PublisherContext, Target
+from composer.runtime.intra_process.topic import LatchedMessages
 from composer.runtime.ports import RunningPort
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.qos_events import QosEvents
@@ -112,7 +111,6 @@ class SubscriptionPort(RunningPort):
         "_handler",
         "_hops",
         "_latched",
-        "_lifespan_s",
         "_mailbox",
         "_name",
         "_qos_events",
@@ -134,7 +132,6 @@ class SubscriptionPort(RunningPort):
         self._callback = f"on_{self._name}"
         self._reaction = reaction
         self._handler = handler
-        depth = port.qos.profile.queue_depth
         self._statistics = context.statistics.callback(port.kind.value, self._name)
         self._hops = context.chains.received_by(port)
         handle: Callable[[Any], Any] = mutation_checked(
@@ -146,11 +143,9 @@ class SubscriptionPort(RunningPort):
         self._mailbox = mailbox_type(context, port, handle, self._statistics, self)
         self._count = context.statistics.subscription(self._name)
         self._count.begin(self._mailbox)
-        self._latched: deque[tuple[float, Any]] | None = None  # with the time of reception
-        lifespan_ms = port.qos.profile.lifespan_ms
-        self._lifespan_s = inf if lifespan_ms is None else lifespan_ms / 1000.0
+        self._latched: LatchedMessages | None = None
         if port.qos.profile.durability is Durability.TRANSIENT_LOCAL:
-            self._latched = deque(maxlen=depth)
+            self._latched = LatchedMessages(port.qos.profile, context.loop.clock)
         self._qos_events = self._make_qos_events(port)
         self._subscription = self._make_subscription(port)
         self._remove = self._receive(port)
@@ -159,11 +154,8 @@ class SubscriptionPort(RunningPort):
         """Handle the messages that were latched meanwhile."""
         self._mailbox.restart()
         self._qos_events.activate()
-        since_s = self._context.loop.clock.monotonic() - self._lifespan_s
-        while self._latched:
-            received_s, message = self._latched.popleft()
-            if received_s >= since_s:
-                self._mailbox.put(message)
+        for message in () if self._latched is None else self._latched.take():
+            self._mailbox.put(message)
 
     def deactivate(self) -> None:
         """Drop or latch the messages that wait."""
@@ -174,7 +166,7 @@ class SubscriptionPort(RunningPort):
         if self._latched is None:
             self._context.statistics.dropped += 1
         else:
-            self._latched.append((self._context.loop.clock.monotonic(), message))
+            self._latched.put(message)
 
     def count_drop(self) -> None:
         """Count a message that was dropped from the full queue."""

@@ -230,7 +230,7 @@ class ChangeStates:
     ``participant`` is the one that is meant, as it reports itself, or empty: another process of the
     same name, on another computer for example, receives the request as well, but neither follows
     nor answers it. ``sender`` identifies the coordinating process, ``seen_report`` is the number of
-    the last report that it has received: see ``manager/member_service.py``. ``are_last`` is whether
+    the last report that it has received: see ``manager/publishing.py``. ``are_last`` is whether
     the process ends after the steps.
     """
 

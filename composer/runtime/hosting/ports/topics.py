@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -22,6 +21,7 @@ from composer.runtime.hosting.declared_ports import OF_EVERY_NODE
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.ports.qos_events import HostedQosEvents, PendingQosEvents
 from composer.runtime.intra_process.publisher import copy_of
+from composer.runtime.intra_process.topic import LatchedMessages
 from composer.runtime.ports.mailbox import Mailbox
 from composer.runtime.ports.qos_events import QosEvents
 from composer.runtime.ports.topics import PublisherPort, SubscriptionPort
@@ -46,7 +46,7 @@ class HostedPublisher(PublisherPort):
             kind: instance.function(callback, publisher, context)
             for kind, callback in events.callbacks(PortKind.PUBLISHER).items()
         }
-        self._held: deque[Any] = deque(maxlen=port.qos.profile.queue_depth)
+        self._held = LatchedMessages(port.qos.profile, context.loop.clock)
         super().__init__(context, port)
         # An attribute of the object hides the method of the class at no cost per call.
         publisher.publish = self._publish_function()  # type: ignore[method-assign, assignment]
@@ -54,8 +54,8 @@ class HostedPublisher(PublisherPort):
     def activate(self) -> None:
         """Send the messages that were kept."""
         super().activate()
-        while self._held:
-            self.gated.publish(self._held.popleft())
+        for message in self._held.take():
+            self.gated.publish(message)
 
     def destroy(self) -> None:
         """Destroy the publisher."""
@@ -80,7 +80,7 @@ class HostedPublisher(PublisherPort):
         if self._context.gate.outgoing:
             self.gated.publish(message)
         else:
-            self._held.append(message if isinstance(message, bytes) else copy_of(message))
+            self._held.put(message if isinstance(message, bytes) else copy_of(message))
 
     def _make_qos_events(self, port: Port) -> QosEvents:
         return HostedQosEvents(self._context, port, self._callbacks)
