@@ -23,7 +23,7 @@ from composer.base.diagnostics import (
 )
 from composer.interfaces import Interfaces
 from composer.model import BehaviorReference, Node
-from composer.python_code.checks import code_problems
+from composer.python_code.checks.node_code import code_problems
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.modules import nearby_modules
 from composer.python_code.problems import Family, Problem

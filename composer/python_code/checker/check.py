@@ -17,7 +17,7 @@ from composer.python_code.checker.file_sets import FileSet, file_sets
 from composer.python_code.checker.findings import MISSING_RETURN, SYNTAX_KINDS, Reader
 from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding, Run, start
-from composer.python_code.checker.relevance import Relevance, reassigned
+from composer.python_code.checker.relevance import Relevance, changed_names
 from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.problems import CheckerFailed, Family, Problem
 
@@ -38,7 +38,6 @@ class Check:
     _copies: Mapping[str, Copy]
     _stubs: Mapping[str, str]
     _run: Run
-    _unread: list[tuple[str, Span]] = field(default_factory=list)  # first places after the limit
 
     @classmethod
     def start(cls, files: FileSet, interfaces: Interfaces) -> Check:
@@ -47,9 +46,7 @@ class Check:
         for name, file in files.files.items():
             texts[name] = file.text.text
             if not isinstance(file.content, BrokenModule):
-                edits = files.edits.get(file.content.path, {})
-                is_behavior = file.node.behavior is not None
-                copies[name] = edited_copy(file.content, edits, is_behavior=is_behavior)
+                copies[name] = edited_copy(file.content, file.node, files.nodes, interfaces)
                 texts[name] = copies[name].text
         run = start({**texts, **stubs}, texts, files.search_paths())
         return cls(files, interfaces, copies, stubs, run)
@@ -58,37 +55,46 @@ class Check:
         """End the check."""
         self._run.close()
 
-    def problems(self) -> list[tuple[str, Problem]]:
-        """Wait for the problems, each with the name of its file. Raises CheckerFailed.
-
-        A line has one report of each family, and a file one of each message.
-        """
+    def problems(self) -> Iterator[tuple[str, Problem]]:
+        """Wait for the problems, each with the name of its file. Raises CheckerFailed."""
         findings = self._run.findings()
+        yield from self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS})
+        places = self._places(findings)
         owners = Owners(self.files.behaviors, self._stubs)
-        found = list(self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS}))
-        seen: set[tuple[object, ...]] = set()
-        wrong_imports: dict[str, list[str]] = {}
-        for finding, span, code, relevance in self._relevant(findings, owners):
-            path = finding.path
-            source = self.files.files[path].source
-            reader = Reader(finding, source, code, relevance, owners, self._interfaces, span)
-            problem = reader.problem()
+        codes = {path: CodeIndex(self._copies[path].module) for path in places}
+        attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
+        classes = frozenset(name for module in self.files.modules for name in module.classes)
+        for path, in_file in places.items():
+            file = self.files.files[path]
+            changed = changed_names(finding for finding, _ in in_file)
+            relevance = Relevance(codes[path], file, owners, changed, attributes, classes)
+            for problem in self._problems_in(in_file[:MAX_FINDINGS], relevance):
+                yield path, problem
+            for _, span in in_file[MAX_FINDINGS : MAX_FINDINGS + 1]:
+                yield path, Problem(Family.NOT_CHECKED, _TOO_MANY, span)
+
+    def _problems_in(
+        self, findings: Iterable[tuple[Finding, Span]], relevance: Relevance
+    ) -> Iterator[Problem]:
+        """Yield the problems of a file: one of each family in a line, and one of each message."""
+        seen: set[object] = set()
+        wrong_imports: list[str] = []
+        for finding, span in findings:
+            if not relevance.keeps(finding, span):
+                continue
+            problem = Reader(finding, span, relevance, self._interfaces).problem()
             if problem is None:
                 continue
-            keys: set[tuple[object, ...]] = {(path, problem.span.line, problem.family)}
+            keys: set[object] = {(problem.span.line, problem.family)}
             if finding.kind != "missing-import":  # all places of one are shown together
-                keys.add((path, problem.message))
+                keys.add(problem.message)
+            text = problem.span.text
             if problem.family is Family.IMPORT:
-                wrong_imports.setdefault(path, []).append(problem.span.text)
-            is_follow_up = problem.family is Family.NAME and _is_meant(
-                problem.span.text, wrong_imports.get(path, ())
-            )
+                wrong_imports.append(text)
+            is_follow_up = problem.family is Family.NAME and _is_meant(text, wrong_imports)
             if seen.isdisjoint(keys) and not is_follow_up:
-                found.append((path, problem))
+                yield problem
             seen |= keys
-        return found + [
-            (path, Problem(Family.NOT_CHECKED, _TOO_MANY, span)) for path, span in self._unread
-        ]
 
     def _syntax_problems(self, refused: set[str]) -> Iterator[tuple[str, Problem]]:
         """Yield the files that Python cannot parse, those that the checker can parse as info."""
@@ -103,11 +109,9 @@ class Check:
                 problem = Problem(Family.NOT_CHECKED, message, problem.span, hint)
             yield name, problem
 
-    def _relevant(
-        self, findings: Iterable[Finding], owners: Owners
-    ) -> Iterator[tuple[Finding, Span, CodeIndex, Relevance]]:
-        """Yield the findings that matter, with their places in users' files."""
-        by_path: dict[str, list[tuple[Finding, Span]]] = {}
+    def _places(self, findings: Iterable[Finding]) -> dict[str, list[tuple[Finding, Span]]]:
+        """Return the findings by file, with their places in users' files."""
+        places: dict[str, list[tuple[Finding, Span]]] = {}
         for finding in findings:
             copy = self._copies.get(finding.path)
             # A missing 'return' is reported at the type of the result, which may be added.
@@ -115,26 +119,8 @@ class Check:
                 finding.message.endswith(MISSING_RETURN)
                 or not copy.is_added(finding.line, finding.column)
             ):
-                by_path.setdefault(finding.path, []).append((finding, _span(finding, copy)))
-        for path, in_file in by_path.items():
-            self._unread += ((path, span) for _, span in in_file[MAX_FINDINGS : MAX_FINDINGS + 1])
-            del in_file[MAX_FINDINGS:]
-        codes = {path: CodeIndex(self._copies[path].module) for path in by_path}
-        attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
-        classes = frozenset(name for module in self.files.modules for name in module.classes)
-        for path, in_file in by_path.items():
-            changed = [span.line for finding, span in in_file if finding.kind == "bad-assignment"]
-            relevance = Relevance(
-                codes[path],
-                is_class=self.files.files[path].node.behavior is None,
-                reassigned=reassigned(codes[path], changed),
-                attributes=attributes,
-                classes=classes,
-                messages=owners.messages,
-            )
-            for finding, span in in_file:
-                if relevance.keeps(finding, span):
-                    yield finding, span, codes[path], relevance
+                places.setdefault(finding.path, []).append((finding, _span(finding, copy)))
+        return places
 
 
 @dataclass(slots=True)
@@ -195,7 +181,7 @@ def start_checks(
     classes: Sequence[tuple[Node, BehaviorSource]], interfaces: Interfaces
 ) -> RunningCheck:
     """Start to check the classes of nodes; ``problems`` waits for what they find."""
-    check = RunningCheck(interfaces, file_sets(classes, interfaces)[:_MAXIMUM])
+    check = RunningCheck(interfaces, file_sets(classes)[:_MAXIMUM])
     check.fill()
     return check
 

@@ -18,7 +18,6 @@ from composer.python_code.trees import (
     span_of,
 )
 
-_Assignment = ast.Assign | ast.AnnAssign | ast.AugAssign
 #: Statements whose code may be left out, or may fail.
 _CONDITIONAL = (ast.If, ast.Match, ast.Try, ast.With)
 #: What code raises that uses a value of a wrong type.
@@ -79,10 +78,6 @@ class CodeIndex:
     def class_at(self, line: int) -> ast.ClassDef | None:
         """Return the innermost class that contains a line."""
         return next((node for node in self.around(line) if isinstance(node, ast.ClassDef)), None)
-
-    def assignment_at(self, line: int) -> _Assignment | None:
-        """Return the assignment in a line."""
-        return next((node for node in self.around(line) if isinstance(node, _Assignment)), None)
 
     def expression_at(self, span: Span) -> ast.expr | None:
         """Return the outermost expression at a place."""

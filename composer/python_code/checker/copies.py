@@ -9,18 +9,22 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import field
+from pathlib import Path
 from typing import TypeGuard
 
 from composer.base.fast_dataclass import dataclass
+from composer.interfaces import Interfaces
+from composer.model import Node, PortKind
 from composer.python_code.checker.callbacks import callback_signatures
-from composer.python_code.checker.file_sets import ClassEdit
 from composer.python_code.nodes import Signature
+from composer.python_code.stubs.behaviors import port_type, signatures
 from composer.python_code.stubs.messages import interface_modules
 from composer.python_code.syntax import Method, Module
 from composer.python_code.trees import (
     Function,
+    bindings,
     characters,
     dotted,
     is_none,
@@ -51,26 +55,39 @@ class Copy:
         return max(number - sum(added <= number for added in self.added), 1)
 
 
-def edited_copy(module: Module, classes: Mapping[str, ClassEdit], *, is_behavior: bool) -> Copy:
-    """Return the copy of a file for the checker; ``classes`` has edits by the name of a class."""
+def edited_copy(
+    module: Module,
+    user: Node,
+    nodes: Mapping[tuple[Path | None, str], tuple[Node, str]],
+    interfaces: Interfaces,
+) -> Copy:
+    """Return the copy of a file for the checker.
+
+    ``user`` is a node that uses the file; ``nodes`` has the nodes of classes with their bases.
+    """
     edits = _Edits(module.source.text.split("\n"))
     names: set[str] = set()
     for class_ in module.classes.values():
-        edits.remove_unset_attributes(class_.node, stays_none=is_behavior)
-        edit = classes.get(class_.name, ClassEdit())
-        if edit.base and edit.base.rpartition(".")[2] not in class_.bases:
-            edits.add_base(class_.node, edit.base)
-        signatures = {
-            **callback_signatures(class_.node, module, edit.ports),
-            **edit.signatures,
+        edits.remove_unset_attributes(class_.node, stays_none=user.behavior is not None)
+        node, base = nodes.get((module.path, class_.name), (None, ""))
+        if base and base not in {name.rpartition(".")[2] for name in class_.bases}:
+            edits.add_base(class_.node, f"composer.typed.{base}")
+        ports = {
+            f"self.action_clients.{port.name}": port_type(port, interfaces) or ""
+            for port in (node.ports_of(PortKind.ACTION_CLIENT) if node is not None else ())
         }
+        known = callback_signatures(class_.node, module, ports)
+        if node is not None and node.behavior is not None:
+            known |= signatures(node, interfaces)
         for method in class_.methods:
-            signature = signatures.get(method.name)
+            signature = known.get(method.name)
             if signature is not None and method.node is not None:
                 edits.annotate(method, method.node, signature)
                 types = [signature.result, *(type_ for _, type_ in signature.arguments)]
                 names.update(interface_modules(" ".join(types)))
-    edits.added.append((_lines_of_head(module.tree), ", ".join((_IMPORTS, *sorted(names)))))
+    imports = (item for item in module.tree.body if isinstance(item, ast.ImportFrom))
+    first = [item.end_lineno or 0 for item in imports if item.module == "__future__"]
+    edits.added.append((max(first, default=0), ", ".join((_IMPORTS, *sorted(names)))))
     return edits.copy(module)
 
 
@@ -95,8 +112,7 @@ class _Edits:
         Otherwise the checker takes None as the type of the attribute, whatever the others set. If
         ``stays_none``, a method of its own says that the value may be None.
         """
-        set_elsewhere = set(_attributes_set(node))
-        unset = [item for item in _constructor(node) if _is_unset(item, set_elsewhere)]
+        unset = [item for item in _constructor(node) if _is_unset(item, bindings(node))]
         for item in unset:
             line = self.lines[item.lineno - 1]
             start, end = item.col_offset, item.end_col_offset or item.col_offset
@@ -158,19 +174,14 @@ def _constructor(node: ast.ClassDef) -> list[ast.stmt]:
     return next((item.body for item in found if isinstance(item, ast.FunctionDef)), [])
 
 
-def _attributes_set(node: ast.ClassDef) -> Iterator[str]:
-    """Yield the attributes that methods set to something else than None."""
-    for item in ast.walk(node):
-        if isinstance(item, ast.Assign) and not is_none(item.value):
-            yield from (dotted(target) for target in item.targets)
-
-
-def _is_unset(statement: ast.stmt, attributes: Container[str]) -> TypeGuard[ast.Assign]:
-    """Return whether a statement is ``self.name = None`` for one of the attributes."""
+def _is_unset(
+    statement: ast.stmt, values: Mapping[str, list[ast.expr | None]]
+) -> TypeGuard[ast.Assign]:
+    """Return whether a statement is ``self.name = None``, and others set a value."""
     match statement:
         case ast.Assign(targets=[ast.Attribute() as target], value=ast.Constant(value=None)):
-            is_one_line = statement.end_lineno == statement.lineno
-            return is_one_line and dotted(target) in attributes
+            others = filter(None, values.get(dotted(target), ()))
+            return statement.end_lineno == statement.lineno and not all(map(is_none, others))
     return False
 
 
@@ -178,15 +189,3 @@ def _is_generic(annotation: ast.expr, type_: str) -> bool:
     """Return whether an annotation such as ``ServerGoalHandle`` lacks the types in brackets."""
     name, bracket, _ = type_.partition("[")
     return bool(bracket) and dotted(annotation).rpartition(".")[2] == name.rpartition(".")[2]
-
-
-def _lines_of_head(tree: ast.Module) -> int:
-    """Return the number of lines before the first statement that may follow an import."""
-    last = 0
-    for statement in tree.body:
-        is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
-        is_future = isinstance(statement, ast.ImportFrom) and statement.module == "__future__"
-        if not (is_docstring or is_future):
-            break
-        last = statement.end_lineno or last
-    return last

@@ -16,14 +16,11 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
-from composer.model import Node, PortKind
+from composer.model import Node
 from composer.python_code.lookup import BehaviorSource, BrokenModule
-from composer.python_code.nodes import Signature
 from composer.python_code.stubs.behaviors import (
     behavior_class_name,
     behavior_module,
-    port_type,
-    signatures,
 )
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.stubs.messages import message_stubs
@@ -38,18 +35,6 @@ _RCLPY_PACKAGES = frozenset(
     {"action_msgs", "builtin_interfaces", "lifecycle_msgs", "rcl_interfaces", "rosgraph_msgs"}
     | {"unique_identifier_msgs"}
 )
-
-
-@dataclass(frozen=True, slots=True)
-class ClassEdit:
-    """What a class of the project gets: a base class, "" for none, and signatures by method.
-
-    ``ports`` are the types of the action clients of a behavior, by what its code calls them.
-    """
-
-    base: str = ""
-    signatures: Mapping[str, Signature] = field(default_factory=dict)
-    ports: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,27 +55,28 @@ class CheckedFile:
 class FileSet:
     """The files of one check, by their names below its folder.
 
-    ``behaviors`` are the generated base classes by name, each with its node. ``folders`` are the
-    folders from which modules are imported, by their top-level names. This Python cannot parse some
-    files: the checker knows newer syntax.
+    ``behaviors`` are the generated base classes by name, each with its node; ``nodes`` are the
+    nodes of classes by file and name, each with the base that the class gets, or "". ``folders``
+    are the folders from which modules are imported, by their top-level names. This Python cannot
+    parse some files: the checker knows newer syntax.
     """
 
     files: dict[str, CheckedFile] = field(default_factory=dict)
     behaviors: dict[str, Node] = field(default_factory=dict)
-    edits: dict[Path, dict[str, ClassEdit]] = field(default_factory=dict)
+    nodes: dict[tuple[Path | None, str], tuple[Node, str]] = field(default_factory=dict)
     folders: dict[str, Path] = field(default_factory=dict)
     search: dict[Path, None] = field(default_factory=dict)
 
     def accepts(self, source: BehaviorSource) -> bool:
         """Return whether the files of a class can be in this check."""
-        if source.path in self.edits and source.reference.class_name in self.edits[source.path]:
+        if (source.path, source.reference.class_name) in self.nodes:
             return False
         return all(
             self.folders.get(name, folder) == folder
             for name, folder in map(_import_root, source.own_modules)
         )
 
-    def add(self, node: Node, source: BehaviorSource, interfaces: Interfaces) -> None:
+    def add(self, node: Node, source: BehaviorSource) -> None:
         """Add the class of a node, with the files that it imports."""
         reference = source.reference
         self.search |= dict.fromkeys((reference.folder, *reference.node_folders))
@@ -103,20 +89,12 @@ class FileSet:
             self.folders[name] = folder
             self.search[folder] = None
         base = ""
-        handlers = {}
-        types = {
-            f"self.action_clients.{port.name.value}": port_type(port, interfaces) or ""
-            for port in node.ports_of(PortKind.ACTION_CLIENT)
-        }
         if node.behavior is not None:
             base = _unused_name(node, self.behaviors)
             self.behaviors[base] = node
-            handlers = signatures(node, interfaces)
         for module, class_ in source.own_classes:
             is_start = class_.name == reference.class_name and module.path == source.path
-            start = f"composer.typed.{base}" if base and is_start else ""
-            edit = ClassEdit(start, handlers, types)
-            self.edits.setdefault(module.path, {})[class_.name] = edit
+            self.nodes[module.path, class_.name] = node, base if is_start else ""
 
     @property
     def modules(self) -> Iterator[Module]:
@@ -153,9 +131,7 @@ class FileSet:
         return [_STUBS, str(LIBRARIES), *(f"{_FILES}{path.as_posix()}" for path in used)]
 
 
-def file_sets(
-    classes: Sequence[tuple[Node, BehaviorSource]], interfaces: Interfaces
-) -> list[FileSet]:
+def file_sets(classes: Sequence[tuple[Node, BehaviorSource]]) -> list[FileSet]:
     """Return the sets of files in which all classes are checked."""
     sets: list[FileSet] = []
     for node, source in classes:
@@ -165,7 +141,7 @@ def file_sets(
         if fitting is None:
             fitting = FileSet()
             sets.append(fitting)
-        fitting.add(node, source, interfaces)
+        fitting.add(node, source)
     return sets
 
 

@@ -17,10 +17,15 @@ from composer.base.spelling import vocabulary
 from composer.interfaces import Interfaces
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
-from composer.python_code.checker.owners import Owner, Owners, public_names
+from composer.python_code.checker.owners import Owner, public_names
 from composer.python_code.checker.pyrefly import Finding
-from composer.python_code.checker.relevance import Relevance, is_parameter, unguarded_value
-from composer.python_code.lookup import BehaviorSource
+from composer.python_code.checker.relevance import (
+    ARGUMENT,
+    NO_ATTRIBUTE,
+    Relevance,
+    is_parameter,
+    unguarded_value,
+)
 from composer.python_code.nodes import API_CLASSES
 from composer.python_code.problems import Family, Problem
 from composer.python_code.trees import (
@@ -46,16 +51,9 @@ _FAMILIES = {
     "missing-attribute": Family.ATTRIBUTE,
     "unknown-name": Family.NAME,
 }
-_NO_ATTRIBUTE = (
-    r"(?:Object of class|Class) `(?P<owner>[\w.]+)` has no (?:class )?attribute `(?P<name>\w+)`"
-)
 _NO_MODULE_ATTRIBUTE = (
     r"(?:No attribute `(?P<name>\w+)` in module|Could not import `(?P<imported>\w+)` from) "
     r"`(?P<module>[\w.]+)`"
-)
-_ARGUMENT = (
-    r"Argument `(?P<given>.+?)` is not assignable to parameter `(?P<name>\w+)` "
-    r"with type `(?P<expected>.+?)` in function `(?P<function>[\w.<>]+)`"
 )
 _ASSIGNMENT = (
     r"`(?P<given>.+?)` is not assignable to (?:attribute `\w+` with type |declared return type )?"
@@ -85,16 +83,14 @@ class Reader:
     """One finding, with what is known about the code around it."""
 
     finding: Finding
-    source: BehaviorSource
-    code: CodeIndex
-    relevance: Relevance
-    owners: Owners
-    interfaces: Interfaces
     span: Span
+    known: Relevance
+    interfaces: Interfaces
 
     @property
-    def _is_class(self) -> bool:
-        return self.relevance.is_class
+    def code(self) -> CodeIndex:
+        """The syntax of the file."""
+        return self.known.code
 
     def problem(self) -> Problem | None:
         """Return what the finding means, None if it does not matter."""
@@ -119,7 +115,7 @@ class Reader:
         node = self.code.import_at(self.span.line)
         if node is None:
             return None
-        imports = Imports(self.code.module, self.source, self.interfaces)
+        imports = Imports(self.code.module, self.known.file.source, self.interfaces)
         found = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
         wanted = found["imported"] if found is not None else node.names[0].name
         if isinstance(node, ast.Import):
@@ -138,7 +134,7 @@ class Reader:
         in_module = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
         if in_module is not None:
             return self._module_attribute(in_module)
-        found = list(re.finditer(_NO_ATTRIBUTE, self.finding.message))
+        found = list(NO_ATTRIBUTE.finditer(self.finding.message))
         if not found:
             return self._in_its_words()
         named, name = found[-1]["owner"], found[-1]["name"]
@@ -151,7 +147,8 @@ class Reader:
         node = self.code.expression_at(self.span)
         module = self.code.module
         is_own = named in module.classes
-        owner = None if is_own else self.owners.named(named, module, with_api=not self._is_class)
+        with_api = not self.known.is_class
+        owner = None if is_own else self.known.owners.named(named, module, with_api=with_api)
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
         if owner is not None:
@@ -159,7 +156,7 @@ class Reader:
         is_stored = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
         if is_stored and not is_own:
             return None  # most objects take any attribute
-        names = public_names("Behavior") if is_own and not self._is_class else ()
+        names = public_names("Behavior") if is_own and with_api else ()
         return self._in_its_words(hint=_meant(self.finding.message) or _did_you_mean(name, names))
 
     def _unawaited_value(self) -> Problem:
@@ -178,7 +175,7 @@ class Reader:
         is_known = is_standard or top in _COMPLETE_MODULES
         if found["imported"] and not is_known:
             return self._import()
-        own = {item.path.stem for item in self.source.own_modules}
+        own = {item.path.stem for item in self.known.file.source.own_modules}
         if not (is_known or top in self.interfaces.packages() or module in own):
             return None  # part of it may be compiled
         at = self.span.text.rfind(name)
@@ -190,8 +187,8 @@ class Reader:
         return self._in_its_words(family, hint)
 
     def _argument(self) -> Problem | None:
-        found = re.search(_ARGUMENT, self.finding.message)
-        if found is None:
+        found = ARGUMENT.search(self.finding.message)
+        if found is None or found["function"] is None:
             return self._in_its_words()
         given, expected, function = found["given"], found["expected"], found["function"]
         if _may_be_none(given, expected):
@@ -216,7 +213,7 @@ class Reader:
         )
         if called is None:
             return self._in_its_words()
-        members = self.owners.messages[called[4]][f"{called[2]}.{called[3]}"]
+        members = self.known.owners.messages[called[4]][f"{called[2]}.{called[3]}"]
         return self._in_its_words(Family.FIELD, Owner(Family.FIELD, members).hint(called[1]))
 
     def _name(self) -> Problem | None:
@@ -265,14 +262,14 @@ class Reader:
     def _missing_return(self, function: Function) -> Problem | None:
         is_open = function.returns is None or is_none(function.returns)
         expected = self.finding.message.split("`")[1]
-        if expected.endswith("Result") and not self._is_class and is_open:
+        if expected.endswith("Result") and not self.known.is_class and is_open:
             return None  # the composer sends an empty result
         self.span = name_span(function, "def", self.span.file)
         return self._in_its_words()
 
     def _none(self) -> Problem | None:
         """Return the problem of a value that may be None, unless the class checks it elsewhere."""
-        if self._is_class:
+        if self.known.is_class:
             return None  # in what order rclpy calls a class is not known
         name = unguarded_value(self.code, self.span, self.finding.message)
         if name is None:

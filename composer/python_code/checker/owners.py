@@ -60,9 +60,10 @@ class Owners:
         is_ambiguous = is_of_api or name == "Parameter"
         imported = module.imports.get(name)
         homes = self.messages.get(name, {})
-        if imported is not None or is_ambiguous:
-            homes = {home: homes[home] for home in homes if imported and home == imported.module}
-        for members in homes.values():
+        members = homes.get(imported.module) if imported is not None else None
+        if members is None and not is_ambiguous:
+            members = next(iter(homes.values()), None)
+        if members is not None:
             return Owner(Family.FIELD, members)
         return Owner(Family.PORT, public_names(name), is_api=True) if is_of_api else None
 

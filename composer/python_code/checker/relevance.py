@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.python_code.checker.code_index import CodeIndex
+from composer.python_code.checker.file_sets import CheckedFile
+from composer.python_code.checker.owners import Owners
 from composer.python_code.checker.pyrefly import Finding
-from composer.python_code.trees import dotted, is_none, last_name
+from composer.python_code.trees import bindings, dotted, is_none, last_name
 
 #: Kinds that are certain in any class, whatever the annotations say.
 _CERTAIN_KINDS = frozenset(
@@ -38,28 +40,36 @@ _RESULT_FOR_RCLPY = r" return (?:type )?`[\w.]*(?:_Response|Result|CallbackRetur
 _BUILTINS = frozenset(
     {"Enum", "bool", "bytes", "dict", "float", "int", "list", "object", "set", "str", "tuple"}
 )
-_GIVEN = (
-    r"Argument `(?P<given>.+?)` is not assignable to parameter"
-    r"(?: `\w+`)?(?: with type `(?P<expected>[^`]*)`)?"
+ARGUMENT = re.compile(
+    r"Argument `(?P<given>.+?)` is not assignable to parameter(?: `(?P<name>\w+)`)?"
+    r"(?: with type `(?P<expected>[^`]*)`)?(?: in function `(?P<function>[\w.<>]+)`)?"
 )
-_OWNER = r"(?:Object of class|Class) `(?P<owner>[\w.@]+)` has no (?:class )?attribute"
+#: The name that gets a value of another type than before.
+_CHANGED = re.compile(r"is not assignable to (?:variable|attribute) `(\w+)`")
+NO_ATTRIBUTE = re.compile(
+    r"(?:Object of class|Class) `(?P<owner>[\w.@]+)` has no (?:class )?attribute `(?P<name>\w+)`"
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Relevance:
     """Decides about the findings in one file.
 
-    ``reassigned`` are the names and own attributes that get values of several types, ``attributes``
-    all attributes that classes of the project define, ``classes`` the names of these classes, and
-    ``messages`` the messages of ROS.
+    ``changed`` are the names that get values of several types, ``attributes`` all attributes that
+    classes of the project define, ``classes`` the names of these classes.
     """
 
     code: CodeIndex
-    is_class: bool  # an rclpy class, in contrast to a behavior
-    reassigned: frozenset[str]
+    file: CheckedFile
+    owners: Owners
+    changed: frozenset[str]
     attributes: frozenset[str]
     classes: frozenset[str]
-    messages: Container[str]
+
+    @property
+    def is_class(self) -> bool:
+        """Whether it is an rclpy class, in contrast to a behavior."""
+        return self.file.node.behavior is None
 
     def keeps(self, finding: Finding, span: Span) -> bool:
         """Return whether a finding points to a mistake."""
@@ -71,8 +81,7 @@ class Relevance:
             is_used = re.match(r"\s*(global |nonlocal |self\.\w+\s*:)", line) is None
             return is_used and span.text in self.code.names
         if is_parameter(kind, message):
-            is_declared = isinstance(self.code.assignment_at(span.line), ast.AnnAssign)
-            return self.is_class and (kind != "bad-assignment" or is_declared)
+            return self.is_class and "to variable `" not in message
         if kind in _ALWAYS or message.startswith(("No attribute", "Instance method")):
             return True
         return not self._is_loose_code(message, span) and self._is_kept(kind, message, span)
@@ -81,36 +90,37 @@ class Relevance:
         """Return whether the code is such that a finding in its line says little."""
         if re.search(_NUMPY, message) or self.code.is_guarded(span.line):
             return True
-        is_reassigned = not self.reassigned.isdisjoint(re.findall(r"\w+", span.text))
-        return is_reassigned or self.code.has_loose_names(span.line)
+        is_changed = not self.changed.isdisjoint(re.findall(r"\w+", span.text))
+        return is_changed or self.code.has_loose_names(span.line)
 
     def _is_kept(self, kind: str, message: str, span: Span) -> bool:
         if kind in ("bad-function-definition", "implicit-bool"):
             return False
         if kind == "bad-assignment":  # without an annotation, a variable may change its kind
-            statement = self.code.assignment_at(span.line)
-            target = statement.target if isinstance(statement, ast.AnnAssign) else None
-            return isinstance(target, ast.Name) and not self.is_class
+            return not (self.is_class or _CHANGED.search(message))
         if kind == "bad-return" and self.is_class:  # other annotations may be wrong
             return re.search(_RESULT_FOR_RCLPY, message) is not None
         node = self.code.expression_at(span)
         if kind == "missing-attribute":
             return self._keeps_attribute(message, node)
         is_ros = re.search(_ROS, message) is not None
-        given = re.search(_GIVEN, message) if kind == "bad-argument-type" else None
+        given = ARGUMENT.search(message) if kind == "bad-argument-type" else None
         if given is not None and self._is_loose(given, node, is_ros=is_ros):
             return False
         named = [given["given"]] if given is not None else re.findall(r"`(\w+)`", message)
-        is_message = any(name in self.messages and name not in self.classes for name in named)
+        is_message = any(
+            name in self.owners.messages and name not in self.classes for name in named
+        )
         return not self.is_class or kind in _CERTAIN_KINDS or is_ros or is_message
 
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
-        owner = re.search(_OWNER, message)
+        owner = NO_ATTRIBUTE.search(message)
         name = owner["owner"] if owner is not None else ""
         value = node.value if isinstance(node, ast.Attribute) else None
         if isinstance(node, ast.Attribute) and (name in self.classes or name.startswith("Self@")):
-            changed = self.code.assignment_at(node.lineno)
-            is_read = isinstance(node.ctx, ast.Load) or isinstance(changed, ast.AugAssign)
+            around = self.code.around(node.lineno)
+            is_changed = any(isinstance(item, ast.AugAssign) for item in around)
+            is_read = isinstance(node.ctx, ast.Load) or is_changed
             is_defined = node.attr in self.attributes or self.code.sets_computed_names
             return is_read and not is_defined
         if name in ("property", "NoneType") and (self.is_class or name == "property"):
@@ -131,25 +141,21 @@ class Relevance:
         members = {*types} - {"Any", "Unknown"}
         if len(members) > 1 and "None" not in members:
             return True
-        if given == "int" and isinstance(node, ast.Subscript):
-            return True  # an element of a list that got other values later
         if not self.is_class or given in _BUILTINS or node is None:
             return False
         # Annotations of arguments, and of attributes that store them, may be wrong.
         return last_name(node).strip("_") in self.code.annotated_arguments
 
 
-def reassigned(code: CodeIndex, lines: Iterable[int]) -> frozenset[str]:
-    """Return the names and own attributes that get values of several types in ``lines``."""
-    nodes = filter(None, (code.assignment_at(line) for line in lines))
-    targets = (x for node in nodes for x in ast.walk(node) if hasattr(x, "ctx"))
-    names = (dotted(x).removeprefix("self.") for x in targets if isinstance(x.ctx, ast.Store))
-    return frozenset(name for name in names if name and "." not in name)
-
-
 def is_parameter(kind: str, message: str) -> bool:
     """Return whether a parameter of rclpy is in the place of its value."""
     return kind in _USES_OF_PARAMETERS and "`Parameter`" in message
+
+
+def changed_names(findings: Iterable[Finding]) -> frozenset[str]:
+    """Return the variables and attributes that get values of several types."""
+    found = (_CHANGED.search(x.message) for x in findings if x.kind == "bad-assignment")
+    return frozenset(match[1] for match in found if match is not None)
 
 
 _STARTS = frozenset({"__init__", "on_configure", "on_activate"})
@@ -179,8 +185,8 @@ def unguarded_value(code: CodeIndex, span: Span, message: str) -> str | None:
     scope = code.class_at(span.line) if is_own else code.function_at(span.line)
     if scope is not None and name and code.is_checked(scope, name):
         return None
-    if not is_own:
-        return ast.unparse(node)[:_LONGEST]
-    functions = {x: code.function_at(x.lineno) for x in code.values_of(name, span.line)}
-    values = (x for x, function in functions.items() if getattr(function, "name", "") in _STARTS)
-    return name if scope is not None and all(map(is_none, values)) else None
+    if not is_own or not isinstance(scope, ast.ClassDef):
+        return ast.unparse(node)[:_LONGEST] if not is_own else None
+    starts = (item for item in scope.body if getattr(item, "name", "") in _STARTS)
+    values = (value for start in starts for value in bindings(start).get(name, ()))
+    return name if all(map(is_none, values)) else None

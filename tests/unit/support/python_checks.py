@@ -11,7 +11,7 @@ from composer.base.source import Located
 from composer.interfaces import Interfaces
 from composer.loading import load_bytes
 from composer.model import BehaviorReference, Node
-from composer.python_code.checks import code_problems
+from composer.python_code.checks.node_code import code_problems
 from composer.python_code.lookup import find_behavior
 from composer.python_code.problems import Problem
 
