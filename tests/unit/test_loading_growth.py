@@ -11,9 +11,9 @@ import pytest
 from composer.loading import load, load_bytes
 from tests.unit.support.growth import assert_linear
 
-SMALL, LARGE = 100, 800
+SMALL, LARGE = 50, 400
 #: From 500 names on, each comparison takes longer, by a constant. Comparing names is fast.
-OTHER_LARGE = {"remappings misspelt": 400, "nodes left out": 3_200}
+OTHER_LARGE = {"remappings misspelt": 200, "nodes left out": 3_200}
 STRING = "type: std_msgs/msg/String"
 NODES = f"  node_#: {{publishers: {{a: {{{STRING}}}}}, subscriptions: {{x: {{{STRING}}}}}}}\n"
 PORTS = f"      port_#: {{{STRING}}}\n"
@@ -164,7 +164,7 @@ def test_many_valid_nodes(tmp_path: Path, nodes: Callable[[int], str]) -> None:
         assert len(loading.system.nodes) == count + 1
         assert loading.diagnostics == []
 
-    assert_linear(validate, 250, 2_000)
+    assert_linear(validate, 125, 1_000)
 
 
 @pytest.mark.slow
@@ -180,7 +180,7 @@ def test_many_included_nodes(tmp_path: Path) -> None:
         assert len(loading.system.nodes) == 5 * count
         assert loading.diagnostics == []
 
-    assert_linear(validate, 50, 400)
+    assert_linear(validate, 25, 200)
 
 
 #: By name: the begin of a file, a part that is repeated up to the size, and the end. A ``#`` in it
@@ -242,7 +242,7 @@ def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
         content = f"system: large\n{begin}{text}{end}".encode()
         load_bytes(content, tmp_path, shown="large.yaml")
 
-    assert_linear(validate, 50_000, 400_000)
+    assert_linear(validate, 25_000, 200_000)
 
 
 SECTION = "/n#: {ros__parameters: {a: 1}}\n"
@@ -282,12 +282,12 @@ def test_large_scenarios(tmp_path: Path, section: str, part: str) -> None:
         loading = load_bytes(content, tmp_path, shown="scenario.yaml")
         assert loading.system is not None
 
-    assert_linear(validate, 30_000, 240_000)
+    assert_linear(validate, 15_000, 120_000)
 
 
 NODE_TYPE = "node: big\npublishers:\n" + "".join(f"  p{n}: {{{STRING}}}\n" for n in range(400))
 PARAMETERS = ", ".join(f"a{number}: 1" for number in range(5_001))
-LOG = f"log: '{{{' + '.join(['1'] * 30)} + ${{i}}}}'"
+LOG = f"log: '{{{' + '.join(['1'] * 30)}}}'"
 TOO_MANY_VALUES = (
     "with this node, the nodes declare more than 400,000 values, counting expressions by "
     "their length"
@@ -342,4 +342,4 @@ def test_many_names_in_parameter_files(tmp_path: Path, name: str) -> None:
         loading = load_bytes(text.encode(), tmp_path, shown="large.yaml")
         assert loading.system is not None
 
-    assert_linear(validate, 200, 1_600)
+    assert_linear(validate, 100, 800)
