@@ -39,10 +39,11 @@ def definitions(known: Mapping[str, str]) -> dict[str, str]:
 
 
 def main() -> None:
-    """Write the snapshot."""
-    known = json.loads(TARGET.read_text(encoding="utf-8"))
-    text = json.dumps(definitions(known), indent=0, ensure_ascii=False)
-    TARGET.write_text(text + "\n", encoding="utf-8")
+    """Write the snapshot if it changes: make compiles the interfaces again after it was written."""
+    before = TARGET.read_text(encoding="utf-8")
+    text = json.dumps(definitions(json.loads(before)), indent=0, ensure_ascii=False) + "\n"
+    if text != before:
+        TARGET.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
