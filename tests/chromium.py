@@ -14,7 +14,11 @@ from tests.programs import require
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+#: The first one is a small program of Debian, which needs two thirds of the processor time.
+PROGRAMS = (
+    "chromium-headless-shell",
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
+)
 
 
 def chromium() -> str | None:
