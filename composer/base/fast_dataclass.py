@@ -1,6 +1,6 @@
 """A ``dataclass`` that is defined in a tenth of the time, because a command defines 200 to 300.
 
-See docs/decisions/0017-start-up.md.
+See docs/decisions/0014-start-up.md.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ PATIENCE_S = 30.0
 @pytest.mark.slow
 @pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[0])
 def test_ctrl_c_in_the_first_moments(words: tuple[str, ...]) -> None:
-    """Before our first line, Python itself prints where it was: see decision 0024."""
+    """Before our first line, Python itself prints where it was: see decision 0012."""
     seed = random.randrange(2**32)
     chance = random.Random(seed)
     for _ in range(TIMES):

@@ -3,7 +3,7 @@
 rcl and the middleware print with the GIL or locks of their own held: a wait would stop all nodes.
 C gets other streams as ``stdout`` and ``stderr``, whose file descriptors do not block; what cannot
 be written at once is dropped. The descriptors 1 and 2, which processes that user code starts
-inherit, remain as they are. See docs/decisions/0012-output-never-blocks.md.
+inherit, remain as they are. See docs/decisions/0010-output-never-blocks.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Console output that never blocks the program: a bounded queue and a thread for each stream.
 
 Output stops when a terminal is paused (Ctrl-S), a pager waits for a key, or the collector of a log
-hangs. See docs/decisions/0012-output-never-blocks.md.
+hangs. See docs/decisions/0010-output-never-blocks.md.
 """
 
 from __future__ import annotations

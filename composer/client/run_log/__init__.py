@@ -7,7 +7,7 @@
         log-000001.jsonl             the oldest file that is left, one JSON object per line
         log-000002.jsonl             written to now
 
-See docs/decisions/0012-output-never-blocks.md.
+See docs/decisions/0010-output-never-blocks.md.
 """
 
 from composer.client.run_log.reading import Record, Selection, SystemLog, last_records, parse_since

@@ -99,7 +99,7 @@ _PROFILE = Path(__file__).with_name("discovery_server.xml")
 #: The lease in the profile, and the time until clients have noticed its end.
 RESTART_DELAY_S = 6.0
 #: A server that was idle for so long has passed on that the nodes have left. If it ends earlier,
-#: clients may not discover the nodes of the next start: see docs/decisions/0013-fast-dds.md.
+#: clients may not discover the nodes of the next start: see docs/decisions/0011-fast-dds.md.
 _IDLE_S = 0.2
 _IDLE_WITHIN_S = 1.0
 _POLL_S = 0.02

@@ -3,7 +3,7 @@
 A count needs only the number that a ``Signal`` carries. Taking a status is another matter: with
 rmw_fastrtps of Jazzy, ``take_event`` can deadlock while the middleware reports the next event. So
 a status is taken only when one is certain to be available, and everything is watched as soon as
-the endpoint exists. See docs/decisions/0013-fast-dds.md.
+the endpoint exists. See docs/decisions/0011-fast-dds.md.
 """
 
 from __future__ import annotations

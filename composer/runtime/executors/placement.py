@@ -21,7 +21,7 @@ def switch_threads_sooner() -> None:
     """Let a thread wait less for the interpreter while another one computes.
 
     A shorter interval that is set already is kept.
-    See docs/decisions/0009-event-driven-executor.md.
+    See docs/decisions/0007-event-driven-executor.md.
     """
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
 

@@ -2,7 +2,7 @@
 
 With the default configuration, two participants that start at the same time may discover each other
 3 s late, lost messages are resent after up to 3 s, and one command in ten sleeps for a third of a
-second. See docs/decisions/0013-fast-dds.md.
+second. See docs/decisions/0011-fast-dds.md.
 """
 
 from __future__ import annotations

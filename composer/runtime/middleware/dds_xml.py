@@ -2,7 +2,7 @@
 
 The default segment of Fast DDS (0.5 MB) does not hold one image of 640 x 480 pixels: its fragments
 wait for each other, and with best-effort QoS most of them are lost. See
-docs/decisions/0013-fast-dds.md.
+docs/decisions/0011-fast-dds.md.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ security is enabled but not available. Here, these are errors.
 
 The ``discovery`` of a system becomes variables too: child processes inherit them, and the tools of
 ROS use the same ones. What the user has set in the environment takes precedence, as everywhere in
-ROS. See docs/decisions/0013-fast-dds.md.
+ROS. See docs/decisions/0011-fast-dds.md.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class ServicePort(RunningPort):
     Otherwise a request is refused. If a request is refused or its handler fails, the response has
     ``success`` false and the reason in ``message``, if it has such fields. A response without
     ``success`` would look like a result: there is none, a client in this process gets the error,
-    and any other one waits until its time is over. See docs/decisions/0011-lifecycle-and-gate.md.
+    and any other one waits until its time is over. See docs/decisions/0009-lifecycle-and-gate.md.
     """
 
     def __init__(

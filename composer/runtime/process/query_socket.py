@@ -5,7 +5,7 @@ second. The manager of a running system discovered the graph long ago, and knows
 parameters of its nodes. It listens on a Unix socket next to the instance lock. A command sends a
 query of :mod:`composer.runtime.protocol.requests` as one line, and receives a line with what the
 system sees of the network, and the answer, which is empty if the manager is not certain. See
-docs/decisions/0015-query-socket.md.
+docs/decisions/0013-query-socket.md.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Every message class imports ``rosidl_generator_py``, which also imports its generator, with a parser
 and a template engine: 50 ms of CPU time. The package leaves out a generator that cannot be
 imported, as is the case where only what programs need at run time is installed. Import this module
-before the first type support is loaded. See docs/decisions/0017-start-up.md.
+before the first type support is loaded. See docs/decisions/0014-start-up.md.
 """
 
 from __future__ import annotations
