@@ -119,9 +119,6 @@ class FoxgloveConnection(Link):
             self.refuse(error)
         return is_valid
 
-    def _refuse(self, error: RequestError) -> None:
-        self.refuse(error)
-
     def _call_service(self, call: ServiceCall) -> None:
         """Call a service; the client gets the response, or why there is none."""
 

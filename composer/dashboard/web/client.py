@@ -85,7 +85,7 @@ class Client(ABC):
         """Start what a message requests, or answer with an error; return whether it is valid."""
 
     @abstractmethod
-    def _refuse(self, error: RequestError) -> None:
+    def refuse(self, error: RequestError) -> None:
         """Say why a message is refused."""
 
     @abstractmethod
@@ -170,7 +170,7 @@ class Client(ABC):
         try:
             return self._take(message)
         except Exception as error:  # of one message, which must not end the connection
-            self._refuse(internal_error("a message", error))
+            self.refuse(internal_error("a message", error))
             return False
 
     def _log_refused(self, error: RequestError) -> None:

@@ -67,12 +67,13 @@ class Connection(Client):
             self._answer(request)
         except RequestError as error:
             self._log_refused(error)
-            self._refuse(error, identifier)
+            self.refuse(error, identifier)
         except Exception as error:  # the browser gets an answer in any case
-            self._refuse(internal_error("a request", error), identifier)
+            self.refuse(internal_error("a request", error), identifier)
         return identifier is not None
 
-    def _refuse(self, error: RequestError, identifier: int | str | None = None) -> None:
+    def refuse(self, error: RequestError, identifier: int | str | None = None) -> None:
+        """Say why a request is refused."""
         self._outbox.reply(to_json({"id": identifier, "error": error.as_data()}))
 
     def _answer(self, request: ClientRequest) -> None:
@@ -94,7 +95,7 @@ class Connection(Client):
             call,
             timeout_s,
             partial(self._reply, request),
-            partial(self._refuse, identifier=request.id),
+            partial(self.refuse, identifier=request.id),
         )
 
     def _reply(self, request: ClientRequest, result: Any) -> None:
