@@ -29,7 +29,7 @@ from composer.bags.reader import open_bag
 from composer.model import ParameterType, PortKind
 from composer.model.names import matches_wildcard
 from composer.runtime.executors.futures import Future
-from composer.runtime.hosting.user_code import current_code
+from composer.runtime.hosting.user_code import current_instance
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.testing import faults
@@ -253,11 +253,11 @@ class SystemTest(TestedSystem):
         self._before_handler(node, handler, partial(self._block, seconds), "hang")
 
     def _block(self, seconds: float) -> None:
-        code = current_code()
-        if code is None:
+        instance = current_instance()
+        if instance is None:
             self._run.clock.sleep(seconds)
         else:  # as time.sleep() in a class: what is not in its group goes on
-            code.wait(threading.Event(), seconds)
+            instance.wait(threading.Event(), seconds)
 
     def kill(self, node: str, reason: str = "killed by the test") -> None:
         """Let a node fail, so that its ``on_failure`` applies."""

@@ -122,7 +122,7 @@ class AdoptedNode(Node):
         """
         instance = self._composer_instance
         if not (instance.in_transition or instance.ended.is_set()):
-            instance.finish("it called destroy_node()")
+            instance.settings.finish("it called destroy_node()")
 
     # --- entities
 

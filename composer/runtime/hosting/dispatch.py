@@ -26,8 +26,8 @@ from composer.runtime.executors.stacks import is_internal
 from composer.runtime.hosting import adopted_node
 from composer.runtime.hosting.adopted_node import AdoptedLifecycleNode, AdoptedNode
 from composer.runtime.hosting.declared_ports import HostingError
-from composer.runtime.hosting.instance import Instance, current_instance
-from composer.runtime.hosting.user_code import on_thread_start
+from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.user_code import current_instance, on_thread_start
 from composer.runtime.ros.messages import load_type_support
 
 _SECOND_NODE = (
@@ -235,14 +235,14 @@ def _install_context() -> None:
         if instance is None:
             shutdown(**options)
         else:
-            instance.finish("it called rclpy.shutdown()")
+            instance.settings.finish("it called rclpy.shutdown()")
 
     def try_to_shut_down(**options: Any) -> None:
         instance = current_instance()
         if instance is None:
             try_shutdown(**options)
         else:
-            instance.finish("it called rclpy.try_shutdown()")
+            instance.settings.finish("it called rclpy.try_shutdown()")
 
     rclpy.ok = ok  # type: ignore[attr-defined]
     rclpy.init = init_context

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.task import Future as RclpyFuture
 
@@ -12,7 +12,10 @@ from composer.runtime.executors.futures import Awaited
 from composer.runtime.executors.loop import NodeExecutor
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import name_of
-from composer.runtime.hosting.user_code import UserCode, UserFunction
+from composer.runtime.hosting.user_code import UserFunction
+
+if TYPE_CHECKING:
+    from composer.runtime.hosting.instance import Instance
 
 #: Packages that create tasks for their own functions. These call code of the class as such.
 _OTHERS = frozenset({"composer", "rclpy"})
@@ -24,18 +27,10 @@ class InstanceExecutor(NodeExecutor):
     While a task blocks, others run. It is reported and interrupted as a callback is.
     """
 
-    def __init__(
-        self,
-        code: UserCode,
-        spin: Callable[[Awaited, float | None], None],
-        spin_once: Callable[[float | None], None],
-    ) -> None:
-        """``spin`` waits for a future, ``spin_once`` for the end of a callback."""
-        super().__init__(code.context.loop)
-        self._code = code
-        self._context = code.context  # by which a task on a stack is recognized
-        self._spin = spin
-        self._spin_once = spin_once
+    def __init__(self, instance: Instance) -> None:
+        super().__init__(instance.context.loop)
+        self._instance = instance
+        self._context = instance.context  # by which a task on a stack is recognized
 
     def create_task(
         self,
@@ -48,11 +43,11 @@ class InstanceExecutor(NodeExecutor):
         An exception is one of the future, and an error of the node.
         """
         if isinstance(callback, Coroutine):
-            function = UserFunction(self._code, lambda: callback)
+            function = UserFunction(self._instance, lambda: callback)
         elif str(getattr(callback, "__module__", None)).partition(".")[0] in _OTHERS:
             return super().create_task(callback, *arguments, **options)
         else:
-            function = UserFunction(self._code, partial(callback, *arguments, **options))
+            function = UserFunction(self._instance, partial(callback, *arguments, **options))
         function.__name__ = name_of(callback).rpartition(".")[2]
         outcome = RclpyFuture(executor=self)
         self._context.spawn(self._run(function, outcome))
@@ -69,11 +64,11 @@ class InstanceExecutor(NodeExecutor):
 
     def spin_until_future_complete(self, future: Awaited, timeout_sec: float | None = None) -> None:
         """Wait for a future, or for a time."""
-        self._spin(future, timeout_sec)
+        self._instance.spin(future, timeout_sec)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait until a callback has ended, or for a time."""
-        self._spin_once(timeout_sec)
+        self._instance.spin_once(timeout_sec)
 
 
 def fail(future: RclpyFuture, error: BaseException) -> None:

@@ -33,10 +33,9 @@ from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.executor import InstanceExecutor
 from composer.runtime.hosting.user_code import (
+    CallAbandoned,
     PermittedFunction,
-    UserCode,
     UserFunction,
-    current_code,
 )
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.ports import PortSet, RunningPort
@@ -124,7 +123,7 @@ _POLL_PERIOD_S = 0.05
 _GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 
 
-class Instance(UserCode):
+class Instance:
     """What the entities of one instance share."""
 
     def __init__(
@@ -134,8 +133,20 @@ class Instance(UserCode):
         settings: InstanceSettings,
     ) -> None:
         """``contexts`` are the node's, gated by *active* and always on."""
-        context, self._always_on_context = contexts
-        super().__init__(context, settings.finish, may_block=settings.may_block)
+        self.context, self._always_on_context = contexts
+        loop = self.context.loop
+        #: Begin and end a call of a callback.
+        self.begin_blocking = loop.begin_blocking if settings.may_block else _ignore
+        self.end_blocking = loop.end_blocking
+        #: Done at the end of the next callback, if ``rclpy.spin_once`` waits for it.
+        self.spun: Future[None] | None = None
+        #: Set when the instance has been destroyed.
+        self.ended = threading.Event()
+        #: The callbacks that were interrupted, with the identifiers of their threads.
+        self.interrupted: set[tuple[int, str]] = set()
+        #: The threads that the class has started.
+        self.threads: list[threading.Thread] = []
+        self._waits: dict[int, threading.Event] = {}  # by the threads that wait
         self.ports = ports
         self.settings = settings
         self.entities = PortSet()
@@ -152,7 +163,7 @@ class Instance(UserCode):
         #: The parameters as they were declared.
         self.declared: dict[str, Parameter] = {}
         #: ``self.executor`` of the class.
-        self.executor = InstanceExecutor(self, self.spin, self.spin_once)
+        self.executor = InstanceExecutor(self)
         #: The executors of the class's own that the node was added to.
         self.executors: list[Executor] = []
         #: Services of the ROS node that exist as long as the instance.
@@ -251,6 +262,35 @@ class Instance(UserCode):
     def _is_in_transition(self) -> bool:
         return threading.current_thread() is self.transition_thread
 
+    def instrumented(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a callback of the class, with the faults of a test if there is one."""
+        instruments = self.context.instruments
+        if instruments is None:
+            return function
+        return instruments.callback(self.context.names["node"], name, function)
+
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
+        """Block until ``event`` is set, in code of the class; return false after the time.
+
+        In a callback, the loop goes on. Raises CallAbandoned if the call is interrupted.
+        """
+        ident = threading.get_ident()
+        self._waits[ident] = event
+        try:
+            self.context.loop.wait(event, timeout_s)
+        finally:
+            is_interrupted = self._waits.pop(ident, None) is None
+        if is_interrupted:
+            raise CallAbandoned
+        return event.is_set()
+
+    def end_wait(self, ident: int) -> bool:
+        """Interrupt what a thread waits for in :meth:`wait`; return false if it does not wait."""
+        event = self._waits.pop(ident, None)
+        if event is not None:
+            event.set()
+        return event is not None
+
     def wait_for(self, future: Awaited, timeout_s: float | None) -> bool:
         """Block until ``future`` is done, in code of the class; return false after the time.
 
@@ -272,10 +312,8 @@ class Instance(UserCode):
         return is_ready()
 
 
-def current_instance() -> Instance | None:
-    """Return the instance whose code the calling thread runs, or None."""
-    code = current_code()
-    return code if isinstance(code, Instance) else None
+def _ignore(*, expected: bool) -> None:
+    """Do not watch a call."""
 
 
 def changed_parameters(node: Any, declared: Mapping[str, Parameter]) -> dict[str, Parameter]:

@@ -6,7 +6,7 @@ import inspect
 import threading
 from collections.abc import Awaitable, Callable
 from types import FrameType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from rclpy.callback_groups import CallbackGroup
 
@@ -25,88 +25,32 @@ from composer.runtime.executors.stacks import (
 from composer.runtime.executors.strand import in_steps, scope_of
 from composer.runtime.executors.tasks import sleep
 
-
-class UserCode:
-    """The code of one instance, as calls of it need to know it.
-
-    ``finish(reason)`` deactivates the node: the class says that it has finished. With
-    ``may_block``, others run while a call blocks.
-    """
-
-    def __init__(
-        self, context: NodeContext, finish: Callable[[str], None], *, may_block: bool
-    ) -> None:
-        self.context = context
-        self.finish = finish
-        #: Begin and end a call of a callback.
-        self.begin_blocking = context.loop.begin_blocking if may_block else _ignore
-        self.end_blocking = context.loop.end_blocking
-        #: Done at the end of the next callback, if ``rclpy.spin_once`` waits for it.
-        self.spun: Future[None] | None = None
-        #: Set when the instance has been destroyed.
-        self.ended = threading.Event()
-        #: The callbacks that were interrupted, with the identifiers of their threads.
-        self.interrupted: set[tuple[int, str]] = set()
-        #: The threads that the class has started.
-        self.threads: list[threading.Thread] = []
-        self._waits: dict[int, threading.Event] = {}  # by the threads that wait
-
-    def instrumented(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a callback of the class, with the faults of a test if there is one."""
-        instruments = self.context.instruments
-        if instruments is None:
-            return function
-        return instruments.callback(self.context.names["node"], name, function)
-
-    def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
-        """Block until ``event`` is set, in code of the class; return false after the time.
-
-        In a callback, the loop goes on. Raises CallAbandoned if the call is interrupted.
-        """
-        ident = threading.get_ident()
-        self._waits[ident] = event
-        try:
-            self.context.loop.wait(event, timeout_s)
-        finally:
-            is_interrupted = self._waits.pop(ident, None) is None
-        if is_interrupted:
-            raise CallAbandoned
-        return event.is_set()
-
-    def end_wait(self, ident: int) -> bool:
-        """Interrupt what a thread waits for in :meth:`wait`; return false if it does not wait."""
-        event = self._waits.pop(ident, None)
-        if event is not None:
-            event.set()
-        return event is not None
-
-
-def _ignore(*, expected: bool) -> None:
-    """Do not watch a call."""
+if TYPE_CHECKING:
+    from composer.runtime.hosting.instance import Instance
 
 
 class _Current(threading.local):
-    code: UserCode | None = None
+    instance: Instance | None = None
 
 
 _CURRENT = _Current()
 _STARTED_BY = "_composer_code"
 
 
-def current_code() -> UserCode | None:
-    """Return the code that the calling thread runs, or None.
+def current_instance() -> Instance | None:
+    """Return the instance whose code the calling thread runs, or None.
 
     Threads that an instance has started run its code.
     """
-    return _CURRENT.code or getattr(threading.current_thread(), _STARTED_BY, None)
+    return _CURRENT.instance or getattr(threading.current_thread(), _STARTED_BY, None)
 
 
 def on_thread_start(thread: threading.Thread) -> None:
     """Remember whose code has started a thread, if any."""
-    code = current_code()
-    if code is not None:
-        code.threads.append(thread)
-        setattr(thread, _STARTED_BY, code)
+    instance = current_instance()
+    if instance is not None:
+        instance.threads.append(thread)
+        setattr(thread, _STARTED_BY, instance)
 
 
 class UserFunction:
@@ -115,25 +59,25 @@ class UserFunction:
     SystemExit means that the class has finished: the node is deactivated.
     """
 
-    def __init__(self, code: UserCode, function: Callable[..., Any]) -> None:
-        self._context = code.context  # by which a call on a stack is recognized
-        self.code = code
+    def __init__(self, instance: Instance, function: Callable[..., Any]) -> None:
+        self._context = instance.context  # by which a call on a stack is recognized
+        self.instance = instance
         self.is_async = inspect.iscoroutinefunction(function)
         #: Whether the last call, or the last step of a coroutine, has blocked.
         self.blocks = False
         self.__name__ = getattr(function, "__name__", type(function).__name__)
         self.__qualname__ = getattr(function, "__qualname__", self.__name__)
-        self._function = code.instrumented(self.__name__, function)
+        self._function = instance.instrumented(self.__name__, function)
 
     @calls_user_code
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Call the function. Raises what it raises."""
-        before, _CURRENT.code = _CURRENT.code, self.code
-        began = self.code.begin_blocking(expected=self.blocks)
+        before, _CURRENT.instance = _CURRENT.instance, self.instance
+        began = self.instance.begin_blocking(expected=self.blocks)
         try:
             result = self._function(*arguments, **options)
         except SystemExit:
-            self.code.finish("it raised SystemExit")
+            self.instance.settings.finish("it raised SystemExit")
             return None
         except CallCancelled as error:  # it waited for a response when the node left *active*
             if self._context.gate.incoming:
@@ -141,15 +85,15 @@ class UserFunction:
             self._context.log.debug(f"{self.__name__}: {error}")
             return None
         finally:
-            self.blocks = self.code.end_blocking(began)
-            _CURRENT.code = before
-            if self.code.spun is not None:
-                self.code.spun.set_result(None)
+            self.blocks = self.instance.end_blocking(began)
+            _CURRENT.instance = before
+            if self.instance.spun is not None:
+                self.instance.spun.set_result(None)
         return in_steps(_Steps(self), result) if inspect.iscoroutine(result) else result
 
-    def is_one(self, code: UserCode, function: UserFunction | None) -> bool:
-        """Return whether this is ``function``; without it, any one of ``code``."""
-        return self.code is code and function in (None, self)
+    def is_one(self, instance: Instance, function: UserFunction | None) -> bool:
+        """Return whether this is ``function``; without it, any one of ``instance``."""
+        return self.instance is instance and function in (None, self)
 
 
 #: How often a group that has refused a callback is asked again. rclpy asks at each wake-up.
@@ -166,15 +110,20 @@ class PermittedFunction(UserFunction):
     """
 
     def __init__(
-        self, code: UserCode, function: Any, context: NodeContext, group: CallbackGroup, entity: Any
+        self,
+        instance: Instance,
+        function: Any,
+        context: NodeContext,
+        group: CallbackGroup,
+        entity: Any,
     ) -> None:
-        super().__init__(code, function)
+        super().__init__(instance, function)
         self.is_async = True
         self._gate = context.gate
         self._entity = entity
-        self._can_execute = UserFunction(code, group.can_execute)
-        self._begin = UserFunction(code, group.beginning_execution)
-        self._end = UserFunction(code, group.ending_execution)
+        self._can_execute = UserFunction(instance, group.can_execute)
+        self._begin = UserFunction(instance, group.beginning_execution)
+        self._end = UserFunction(instance, group.ending_execution)
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
         """Return a coroutine that calls the function. It raises what the function raises."""
@@ -215,25 +164,25 @@ class _Steps:
 
     def __init__(self, function: UserFunction) -> None:
         self.function = function
-        self._before: UserCode | None = None
+        self._before: Instance | None = None
         self._began: list[bool] | float | None = None
 
     def enter(self) -> None:
         """Begin a step, at once."""
-        self._before, _CURRENT.code = _CURRENT.code, self.function.code
-        self._began = self.function.code.begin_blocking(expected=self.function.blocks)
+        self._before, _CURRENT.instance = _CURRENT.instance, self.function.instance
+        self._began = self.function.instance.begin_blocking(expected=self.function.blocks)
 
     def leave(self) -> None:
         """End a step."""
-        self.function.blocks = self.function.code.end_blocking(self._began)
-        _CURRENT.code = self._before
+        self.function.blocks = self.function.instance.end_blocking(self._began)
+        _CURRENT.instance = self._before
 
 
 class CallAbandoned(Cancelled):
     """Raised in code of a class whose time is over. It is not a fault of the class."""
 
 
-def interrupt(code: UserCode, ident: int, call: FrameType | None = None) -> str:
+def interrupt(instance: Instance, ident: int, call: FrameType | None = None) -> str:
     """Raise CallAbandoned in a thread as soon as it runs code of the user; return where it is.
 
     With ``call``, only until that call has returned. In a function of C, such as ``time.sleep``, it
@@ -243,7 +192,7 @@ def interrupt(code: UserCode, ident: int, call: FrameType | None = None) -> str:
         stack = stacks_of((ident,)).get(ident, [])
         if not stack or (call is not None and call not in stack):
             return ""
-        if code.end_wait(ident):
+        if instance.end_wait(ident):
             return location_of(stack)
         if not is_internal(stack[0].f_code.co_filename):
             raise_in(ident, CallAbandoned)
@@ -253,37 +202,39 @@ def interrupt(code: UserCode, ident: int, call: FrameType | None = None) -> str:
     return ""
 
 
-async def end_callbacks(code: UserCode) -> None:
+async def end_callbacks(instance: Instance) -> None:
     """Wait a moment for the callbacks of an instance to return, then interrupt those that run."""
-    loop = code.context.loop
+    loop = instance.context.loop
     until_s = loop.clock.monotonic() + _RETURN_WITHIN_S
-    while running_callbacks(code) and loop.clock.monotonic() < until_s:
+    while running_callbacks(instance) and loop.clock.monotonic() < until_s:
         await sleep(loop, _PERIOD_S)
-    interrupt_callbacks(code)
+    interrupt_callbacks(instance)
 
 
-def interrupt_callbacks(code: UserCode, function: UserFunction | None = None) -> None:
+def interrupt_callbacks(instance: Instance, function: UserFunction | None = None) -> None:
     """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
-    for ident, call, name in running_callbacks(code, function):
-        at = interrupt(code, ident, call)
-        if (ident, name) not in code.interrupted:
-            code.interrupted.add((ident, name))
+    for ident, call, name in running_callbacks(instance, function):
+        at = interrupt(instance, ident, call)
+        if (ident, name) not in instance.interrupted:
+            instance.interrupted.add((ident, name))
             where = f"; it is at {at}" if at else ""
-            code.context.log.warn(f"{name} is interrupted{where}")
+            instance.context.log.warn(f"{name} is interrupted{where}")
 
 
 def running_callbacks(
-    code: UserCode, function: UserFunction | None = None
+    instance: Instance, function: UserFunction | None = None
 ) -> list[tuple[int, FrameType, str]]:
     """Return the callbacks that other threads run: the thread, the frame and the name of each."""
     current = threading.get_ident()
     found: list[tuple[int, FrameType, str]] = []
-    busy = stacks_of(ident for ident in code.context.loop.busy_threads() if ident != current)
+    busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
     for ident, stack in busy.items():
         with gc_paused():
             called = [(frame, item) for frame in stack if (item := _function_of(frame)) is not None]
         found += [
-            (ident, frame, item.__name__) for frame, item in called if item.is_one(code, function)
+            (ident, frame, item.__name__)
+            for frame, item in called
+            if item.is_one(instance, function)
         ][:1]
     return found
 
@@ -299,8 +250,8 @@ def _function_of(frame: FrameType) -> UserFunction | None:
 class ThreadedCall:
     """A call of user code that may block, on a thread of its own: the loop goes on."""
 
-    def __init__(self, code: UserCode, function: Callable[[], Any], name: str) -> None:
-        self._code = code
+    def __init__(self, instance: Instance, function: Callable[[], Any], name: str) -> None:
+        self._instance = instance
         self._function = function
         self._done: Future[Any] = Future()
         #: Where it was when its time was over: ``file:line``, in code of the user.
@@ -313,14 +264,14 @@ class ThreadedCall:
 
         If the caller is canceled, the call is interrupted as soon as it runs code of the user.
         """
-        self._code.context.loop.clock.start(self.thread)
+        self._instance.context.loop.clock.start(self.thread)
         try:
             return await self._done
         except Cancelled:
             self.location = self.find_location()
             ident = self.thread.ident or 0
-            if not self._code.end_wait(ident):
-                parts = self._code, ident
+            if not self._instance.end_wait(ident):
+                parts = self._instance, ident
                 threading.Thread(target=interrupt, args=parts, daemon=True).start()
             raise
 
@@ -331,7 +282,7 @@ class ThreadedCall:
 
     @calls_user_code
     def _run(self) -> None:
-        _CURRENT.code = self._code
+        _CURRENT.instance = self._instance
         try:
             self._done.set_result(self._function())
         except BaseException as error:

@@ -22,7 +22,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.stacks import is_internal, is_library, outward
 from composer.runtime.hosting.dispatch import install
-from composer.runtime.hosting.instance import Instance, current_instance
+from composer.runtime.hosting.instance import Instance
+from composer.runtime.hosting.user_code import current_instance
 
 _NANOSECONDS = 1_000_000_000
 
