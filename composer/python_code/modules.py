@@ -48,7 +48,8 @@ def module_file(module: str, folder: Path, project: Project) -> Path | None:
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
-    return local_module_file(module, folder, project) or _installed(parts)
+    found = local_module_file(module, folder, project) or _installed(parts)
+    return found if found is not None and found.suffix == ".py" else None
 
 
 def local_module_file(module: str, folder: Path, project: Project) -> Path | None:
@@ -68,15 +69,8 @@ def local_module_file(module: str, folder: Path, project: Project) -> Path | Non
 def is_compiled(module: str) -> bool:
     """Return whether ``module`` exists without Python source: compiled or built in."""
     parts = module.split(".")
-    spec = module_spec(parts[0]) if all(part.isidentifier() for part in parts) else None
-    if spec is None or len(parts) == 1:
-        return spec is not None
-    *parents, last = parts[1:]
-    return any(
-        _exists(Path(location, *parents, last + suffix))
-        for location in spec.submodule_search_locations or ()
-        for suffix in importlib.machinery.EXTENSION_SUFFIXES
-    )
+    origin = _installed(parts) if all(part.isidentifier() for part in parts) else None
+    return origin is not None and origin.suffix != ".py"
 
 
 def relative_module_file(module: str, level: int, importer: Path) -> Path | None:
@@ -106,12 +100,14 @@ def read_text(path: Path) -> str:
         raise Unreadable("is not text in the encoding it declares") from None
 
 
-def module_below(base: Path, parts: Sequence[str]) -> Path | None:
+def module_below(
+    base: Path, parts: Sequence[str], suffixes: Iterable[str] = (".py",)
+) -> Path | None:
     """Return the file of the module with the given parts of its name, in a folder."""
     path = base.joinpath(*parts)
     candidates = [path / "__init__.py"]
     if parts:
-        candidates.append(path.with_name(f"{path.name}.py"))
+        candidates += (path.with_name(f"{path.name}{suffix}") for suffix in suffixes)
     return next((file for file in candidates if _exists(file)), None)
 
 
@@ -131,14 +127,15 @@ def _exists(path: Path) -> bool:
 
 
 def _installed(parts: list[str]) -> Path | None:
+    """Return the file of an installed module; one that is built in has an empty name."""
     spec = module_spec(parts[0])
     if spec is None:
         return None
     if len(parts) == 1:
-        origin = Path(spec.origin) if spec.has_location and spec.origin else None
-        return origin if origin is not None and origin.suffix == ".py" else None
-    locations = spec.submodule_search_locations or ()
-    files = (module_below(Path(location), parts[1:]) for location in locations)
+        return Path((spec.origin or "") if spec.has_location else "")
+    suffixes = (".py", *importlib.machinery.EXTENSION_SUFFIXES)
+    folders = spec.submodule_search_locations or ()
+    files = (module_below(Path(folder), parts[1:], suffixes) for folder in folders)
     return next(filter(None, files), None)
 
 

@@ -139,7 +139,7 @@ def _early_calls(handler: str, method: Method, code: Code) -> Iterator[Problem]:
 def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     """Yield the constant keys of ports and parameters that the node does not have."""
     node, key = scope.code.node, scope.constant(index)
-    section = owner.removeprefix("self.") if scope.method is not None and node.complete else ""
+    section = owner.removeprefix("self.") if scope.class_ is not None and node.complete else ""
     kind, names = "parameter", [item.name.value for item in node.parameters]
     if section in PORT_ATTRIBUTES:
         kind = PORT_ATTRIBUTES[section].value
@@ -154,7 +154,7 @@ def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
 def _unpacked(names: list[ast.expr], array: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     """Yield the array parameters that are assigned to more or fewer names than they have."""
     owner, _, name = dotted(array).rpartition(".")
-    is_own = owner == "self.parameters" and scope.method is not None
+    is_own = owner == "self.parameters" and scope.class_ is not None
     parameter = scope.code.node.parameter(name) if is_own else None
     size = None if parameter is None else array_length(parameter)
     if size is None or any(isinstance(node, ast.Try) or _is_len(node) for node in scope.nodes):

@@ -22,7 +22,6 @@ from composer.python_code.lookup import BehaviorSource
 from composer.python_code.problems import Family, Problem
 from composer.python_code.scopes import Scope
 from composer.python_code.stubs.behaviors import signatures
-from composer.python_code.syntax import Method
 from composer.python_code.trees import Function, bindings, positional_arguments, span_of
 
 #: Maximum number of names and fields to follow.
@@ -40,7 +39,7 @@ class Code:
     @cached_property
     def scopes(self) -> Sequence[NodeScope]:
         """All files and functions."""
-        own: dict[int, tuple[ast.ClassDef, Method, Mapping[str, str]]] = {}
+        own: dict[ast.AST | None, tuple[ast.ClassDef, Mapping[str, str]]] = {}
         for module, class_ in self.source.own_classes:
             if self.node.hosted_class is not None:
                 known = callback_signatures(class_.node, module)
@@ -50,17 +49,15 @@ class Code:
                 signature = known.get(method.name)
                 types = [type_ for _, type_ in signature.arguments] if signature else []
                 passed = dict(zip(method.arguments, types, strict=False))
-                own[id(method.node)] = class_.node, method, passed
+                own[method.node] = class_.node, passed
         scopes = [
             NodeScope(module.source, module.tree, module.names, code=self)
             for module in self.source.own_modules
         ]
         functions = ((home, x) for home in scopes for x in home.nodes if isinstance(x, Function))
         for home, node in tuple(functions):
-            scope = replace(home, function=node)
-            if id(node) in own:
-                scope.class_, scope.method, scope.passed = own[id(node)]
-            scopes.append(scope)
+            place, arguments = own.get(node, (None, {}))
+            scopes.append(replace(home, function=node, class_=place, passed=arguments))
         return tuple(scopes)
 
     @cached_property
@@ -78,7 +75,6 @@ class NodeScope(Scope):
     """
 
     code: Code = field(kw_only=True, repr=False)
-    method: Method | None = None
     passed: Mapping[str, str] = field(default_factory=dict)
 
     def problem(
