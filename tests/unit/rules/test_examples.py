@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import inspect
 import re
+from pathlib import Path
 
-import pytest
-
-from composer.base.diagnostics import Diagnostic, Rule
+from composer.base.diagnostics import Rule
 from composer.report.rules import all_rules, page_of
 from composer.rules import all_checks
 from tests.unit.support.checking import diagnostics_of_each
@@ -33,23 +32,15 @@ PAGES = {rule: page_of(rule) for rule in all_rules()}
 RULES = [rule for rule, page in PAGES.items() if files_of(page.bad) and files_of(page.good)]
 
 
-@pytest.fixture(scope="module")
-def reported(tmp_path_factory: pytest.TempPathFactory) -> dict[Rule, list[list[Diagnostic]]]:
-    """The diagnostics of the bad and of the good example of each rule."""
+def test_a_bad_example_breaks_only_its_rule_and_a_good_one_none(tmp_path: Path) -> None:
     examples = [
         files_of(example) for rule in RULES for example in (PAGES[rule].bad, PAGES[rule].good)
     ]
-    results = diagnostics_of_each(examples, tmp_path_factory.mktemp("examples"))
-    return {rule: results[2 * number : 2 * number + 2] for number, rule in enumerate(RULES)}
-
-
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
-def test_a_bad_example_breaks_only_its_rule_and_a_good_one_none(
-    rule: Rule, reported: dict[Rule, list[list[Diagnostic]]]
-) -> None:
-    bad, good = reported[rule]
-    assert {diagnostic.rule.code for diagnostic in bad} == {rule.code}
-    assert [f"{diagnostic.rule.code}: {diagnostic.message}" for diagnostic in good] == []
+    results = diagnostics_of_each(examples, tmp_path)
+    for rule, bad, good in zip(RULES, results[::2], results[1::2], strict=True):
+        assert {diagnostic.rule.code for diagnostic in bad} == {rule.code}
+        shown = [f"{diagnostic.rule.code}: {diagnostic.message}" for diagnostic in good]
+        assert shown == [], rule.name
 
 
 def test_all_checks_have_tested_examples() -> None:
