@@ -1,7 +1,8 @@
 """The static pipeline: from a file to its model and all of its diagnostics.
 
-:func:`_resolve` and :func:`_check` call the stages in order. Each stage works on what the one
-before it produced, even if that has errors, so that one run shows every diagnostic.
+:func:`~composer.loading.variants.resolve_file` and :func:`_check` call the stages in order. Each
+stage works on what the one before it produced, even if that has errors, so that one run shows every
+diagnostic.
 """
 
 from __future__ import annotations
@@ -10,45 +11,32 @@ import gc
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Map
 from contextlib import contextmanager
-from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
 
 from composer.base.diagnostics import (
     Diagnostic,
-    Severity,
     has_errors,
     in_order,
     registered_rules,
     shown,
 )
-from composer.base.fast_dataclass import dataclass
-from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
 from composer.language.document import parse_bytes
 from composer.language.expand import missing_names
 from composer.language.expand.arguments import read_declarations
 from composer.language.rules import MISSING_VARIABLE
 from composer.language.schema import kind_of, kinds
-from composer.language.tree import Entry, plain
+from composer.language.tree import Entry
 from composer.language.tree_values import word
-from composer.loading.combinations import (
-    MAX_VALUES,
-    Checked,
-    argument_combinations,
-    chosen_values,
-    joined_diagnostics,
-    places_of,
-)
-from composer.loading.merging import Definitions, Document, Merged, merge, read, real_folder
+from composer.loading.combinations import Checked, joined_diagnostics
+from composer.loading.merging import Definitions, Document, read, real_folder
 from composer.loading.reported import Identity, LoadResult, identity, may_be_included
-from composer.model import System
+from composer.loading.variants import Resolved, resolve_file
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
-from composer.model.resolve import NO_OVERRIDES, OverrideOptions, Overrides, read_overrides, resolve
-from composer.model.resolve.parameter_files import PARAMETER_SUBSTITUTION
-from composer.model.resolve.scenario import resolve_scenario
+from composer.model.resolve import NO_OVERRIDES, OverrideOptions, read_overrides
 from composer.project.settings import apply_rule_settings, check_rule_settings
-from composer.rules import Context, all_checks, reported, run_checks
+from composer.rules import all_checks, reported, run_checks
 from composer.rules.analysis.subjects import joined, without_consequences
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
 from composer.rules.type_check import TypeCheck
@@ -88,7 +76,7 @@ def load(
     parsed, diagnostics = read_overrides(overrides)
     definitions = Definitions.of(real_folder(path), interfaces)
     document = read(path, shown)
-    resolved = _resolve(document, definitions, parsed, diagnostics)
+    resolved = resolve_file(document, definitions, parsed, diagnostics)
     [variant] = resolved.variants
     if needs_values and not has_errors(variant.diagnostics):  # else a declaration may be wrong
         variant.diagnostics += _missing_arguments(document, parsed.arguments)
@@ -130,7 +118,7 @@ def _resolve_files(
     options: OverrideOptions = NO_OVERRIDES,
     *,
     all_combinations: bool = False,
-) -> list[_Resolved]:
+) -> list[Resolved]:
     """Turn files into their models. Files of one project share its interfaces."""
     overrides, diagnostics = read_overrides(options)
     shared: dict[tuple[Path, ...], Interfaces] = {}
@@ -142,7 +130,7 @@ def _resolve_files(
             by_folder[folder] = Definitions.with_shared_interfaces(folder, shared)
         document = read(path)
         resolved.append(
-            _resolve(
+            resolve_file(
                 document,
                 by_folder[folder],
                 overrides,
@@ -169,130 +157,8 @@ def load_bytes(
     given, diagnostics = read_overrides(overrides)
     document = Document(*parse_bytes(content, shown))
     definitions = Definitions.of(real_folder(folder / shown), interfaces)
-    return _check([_resolve(document, definitions, given, diagnostics, all_combinations=True)])[0]
-
-
-@dataclass(slots=True)
-class _Variant:
-    """A file with one combination of its arguments. ``context`` is None if there is no model.
-
-    ``equal`` is a variant with the same tree: only that one is checked. ``values`` are the values
-    of the arguments, if there are several combinations.
-    """
-
-    merged: Merged
-    diagnostics: list[Diagnostic]
-    context: Context | None = None
-    equal: _Variant | None = None
-    values: Map[str, str] = field(default_factory=dict)
-
-    @property
-    def system(self) -> System | None:
-        """The model."""
-        return None if self.context is None else self.context.system
-
-    @property
-    def places(self) -> frozenset[str]:
-        """The places of all keys and values."""
-        tree = self.merged.expanded
-        return frozenset() if tree is None else frozenset(places_of(tree))
-
-
-@dataclass(slots=True)
-class _Resolved:
-    """A file with its models, before the rules.
-
-    There is at least one variant: the first one has the given arguments and the defaults.
-    """
-
-    source: SourceFile
-    definitions: Definitions
-    variants: list[_Variant]
-
-
-def _resolve(
-    document: Document,
-    definitions: Definitions,
-    overrides: Overrides | None = None,
-    override_diagnostics: Iterable[Diagnostic] = (),
-    *,
-    all_combinations: bool = False,
-) -> _Resolved:
-    """Turn a file into its models: one, or one for each combination of its arguments."""
-    given = overrides or Overrides()
-    diagnostics = [*document.diagnostics, *override_diagnostics]
-    tree = document.tree
-    if tree is None or not all_combinations or kind_of(tree) != kinds.SYSTEM:
-        variant = _variant(document, definitions, given.arguments, diagnostics)
-        _resolve_model(variant, document.source, definitions, given)
-        return _Resolved(document.source, definitions, [variant])
-    combinations = argument_combinations(tree, given.arguments)
-    variants: list[_Variant] = []
-    by_tree: dict[str, _Variant] = {}
-    values = 0
-    for arguments in combinations.chosen:
-        variant = _variant(document, definitions, arguments, diagnostics)
-        variants.append(variant)
-        if combinations.count > 1:
-            variant.values = chosen_values(tree, arguments)
-            text = repr(variant.merged.expanded and plain(variant.merged.expanded))
-            equal = by_tree.setdefault(text, variant)
-            if equal is not variant:
-                variant.equal = equal
-        if variant.equal is None:
-            _resolve_model(variant, document.source, definitions, given)
-        values += variant.merged.values
-        if values > MAX_VALUES:
-            break
-    variants[0].diagnostics += combinations.unchecked(len(variants))
-    return _Resolved(document.source, definitions, variants)
-
-
-def _variant(
-    document: Document,
-    definitions: Definitions,
-    arguments: Map[str, Entry],
-    diagnostics: Iterable[Diagnostic],
-) -> _Variant:
-    # Kind, includes or inheritance, arguments, copies and conditions, schema.
-    merged = merge(document, definitions, arguments)
-    return _Variant(merged, [*diagnostics, *merged.diagnostics])
-
-
-def _resolve_model(
-    variant: _Variant, source: SourceFile, definitions: Definitions, overrides: Overrides
-) -> None:
-    """Add the model to a variant."""
-    merged = variant.merged
-    if merged.expanded is None:
-        return
-    system, found = resolve(
-        merged.expanded,
-        merged.source or source,
-        definitions.node_types,
-        folders=merged.folders,
-        overrides=overrides,
-    )
-    variant.diagnostics += found
-    if system is not None:
-        scenario = None
-        if merged.scenario is not None:
-            scenario, found = resolve_scenario(merged.scenario, source, system, definitions.folder)
-            variant.diagnostics += found
-        system = replace(system, left_out=merged.left_out)
-        errors = tuple(
-            item.primary
-            for item in variant.diagnostics
-            if item.severity is Severity.ERROR or item.rule is PARAMETER_SUBSTITUTION
-        )
-        variant.context = Context(
-            system,
-            definitions.interfaces,
-            definitions.node_types,
-            errors,
-            is_partial=merged.is_partial,
-            scenario=scenario,
-        )
+    resolved = resolve_file(document, definitions, given, diagnostics, all_combinations=True)
+    return _check([resolved])[0]
 
 
 def _missing_arguments(document: Document, given: Map[str, Entry]) -> Iterator[Diagnostic]:
@@ -311,7 +177,7 @@ def _missing_arguments(document: Document, given: Map[str, Entry]) -> Iterator[D
         )
 
 
-def _check(files: Sequence[_Resolved]) -> list[LoadResult]:
+def _check(files: Sequence[Resolved]) -> list[LoadResult]:
     """Check the models. The type checker runs over Python code while the rules are evaluated."""
     variants = [variant for item in files for variant in item.variants]
     types = TypeCheck.of([item.context for item in variants if item.context is not None])
@@ -325,11 +191,11 @@ def _check(files: Sequence[_Resolved]) -> list[LoadResult]:
         types.close()
 
 
-def _location(file: _Resolved) -> Path:
+def _location(file: Resolved) -> Path:
     return file.definitions.folder / Path(file.source.path).name
 
 
-def _finish(file: _Resolved, types: TypeCheck, checked: Collection[Path]) -> LoadResult:
+def _finish(file: Resolved, types: TypeCheck, checked: Collection[Path]) -> LoadResult:
     """Return what is reported of a file in the end; ``checked`` are all files of this run."""
     source, first = file.source, file.variants[0]
     project = file.definitions.project
