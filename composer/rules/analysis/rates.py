@@ -6,8 +6,10 @@ A rate is a maximum: messages that depend on a condition may be less frequent.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import field
 
 from composer.base.fast_dataclass import dataclass
+from composer.base.graphs import strong_groups
 from composer.model import (
     ChannelKind,
     ImplementationKind,
@@ -186,7 +188,7 @@ class Rates:
     """Rates in hertz; None if unknown."""
 
     causes: Causes
-    topics: Mapping[str, float | None]
+    topics: dict[str, float | None] = field(default_factory=dict)
 
     def topic_hz(self, name: str) -> float | None:
         """Return the rate of messages on a topic."""
@@ -194,16 +196,25 @@ class Rates:
 
     def publisher_hz(self, endpoint: PortOfNode) -> float | None:
         """Return the rate of messages from a publisher."""
-        return _publisher_hz(self.causes, self.topics, endpoint)
+        found = self.causes.get(endpoint.key)
+        if found is None:
+            return None
+        return _total(self.callback_hz(endpoint.node, cause) for cause in found)
 
     def callback_hz(self, node: Node, cause: Cause) -> float | None:
         """Return the rate of the callback of a timer or a subscription."""
-        return _callback_hz(self.topics, node, cause)
+        if cause.timer is not None:
+            period_s = node.period_s(cause.timer)
+            return 1.0 / period_s if period_s is not None else None
+        port = cause.port
+        if port is None or port.kind is not PortKind.SUBSCRIPTION:
+            return None
+        return self.topics.get(port.full_name)
 
 
 def rates(context: Context) -> Rates:
     """Return the rates of a system."""
-    known = context.once(causes)
+    found = Rates(context.once(causes))
     publishers = {
         channel.name: channel.sources
         for channel in context.channels
@@ -213,12 +224,9 @@ def rates(context: Context) -> Rates:
             endpoint.port.external for endpoint in channel.sinks
         )  # nodes outside the system publish there, too
     }
-    topics: dict[str, float | None] = {}
-    for name in _in_order_of_cause(known, publishers):
-        topics[name] = _total(
-            _publisher_hz(known, topics, endpoint) for endpoint in publishers[name]
-        )
-    return Rates(known, topics)
+    for name in _in_order_of_cause(found.causes, publishers):
+        found.topics[name] = _total(map(found.publisher_hz, publishers[name]))
+    return found
 
 
 def _in_order_of_cause(
@@ -228,45 +236,18 @@ def _in_order_of_cause(
 
     Topics in a cycle are left out: they have no rate.
     """
-    missing_causes: dict[str, int] = {}
-    effects: dict[str, list[str]] = {}
-    for name, endpoints in publishers.items():
-        causing = {
+    causing = {
+        name: {
             cause.port.full_name
             for endpoint in endpoints
             for cause in known.get(endpoint.key, ())
             if cause.port is not None and cause.port.full_name in publishers
         }
-        missing_causes[name] = len(causing)
-        for other in causing:
-            effects.setdefault(other, []).append(name)
-    ready = [name for name, count in missing_causes.items() if not count]
-    while ready:
-        name = ready.pop()
-        yield name
-        for effect in effects.get(name, ()):
-            missing_causes[effect] -= 1
-            if not missing_causes[effect]:
-                ready.append(effect)
-
-
-def _publisher_hz(
-    known: Causes, topics: Mapping[str, float | None], endpoint: PortOfNode
-) -> float | None:
-    found = known.get(endpoint.key)
-    if found is None:
-        return None
-    return _total(_callback_hz(topics, endpoint.node, cause) for cause in found)
-
-
-def _callback_hz(topics: Mapping[str, float | None], node: Node, cause: Cause) -> float | None:
-    if cause.timer is not None:
-        period_s = node.period_s(cause.timer)
-        return 1.0 / period_s if period_s is not None else None
-    port = cause.port
-    if port is None or port.kind is not PortKind.SUBSCRIPTION:
-        return None
-    return topics.get(port.full_name)
+        for name, endpoints in publishers.items()
+    }
+    for group in strong_groups(causing):
+        if len(group) == 1 and group[0] not in causing[group[0]]:
+            yield group[0]
 
 
 def _total(found: Iterable[float | None]) -> float | None:
