@@ -26,6 +26,8 @@ from composer.runtime.metrics.figures import MessageRate
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
 SUBSCRIPTION_DEPTH = 1000
+#: Messages that a command takes at once: they may be large.
+_MAX_TAKEN = 20
 _ACKNOWLEDGED_WITHIN_S = 1
 
 
@@ -71,7 +73,7 @@ class TopicSubscription(SampledTopic):
 
     def wait(self, deadline: Deadline) -> list[Sample]:
         """Return the messages that have arrived; wait for the first one until the deadline."""
-        while not (samples := self.take(SUBSCRIPTION_DEPTH)) and not deadline.passed:
+        while not (samples := self.take(_MAX_TAKEN)) and not deadline.passed:
             time.sleep(min(_POLL_PERIOD_S, deadline.left_s))
         return samples
 
