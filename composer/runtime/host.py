@@ -348,10 +348,9 @@ class Host:
 
     def _update_status(self) -> None:
         self._options.on_alive()
-        nodes = tuple(self._node_set.nodes.items())
-        statistics = {name: node.statistics for name, node in nodes}
-        self._status.measure(statistics, self._node_set.reported_figures())
-        self._status.update_states({name: node.state for name, node in nodes})
+        nodes = dict(self._node_set.nodes)
+        self._status.measure(nodes)
+        self._status.update_states({name: node.state for name, node in nodes.items()})
         excess = None if self._options.process is None else memory_excess(self._options.process)
         if excess is not None and not self._main_queue.stopping:
             self._reporter.log(LogLevel.ERROR, PROGRAM_LOGGER, excess)

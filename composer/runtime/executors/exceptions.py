@@ -74,14 +74,8 @@ def printable(text: object) -> str:
     return _plain(str(text))
 
 
-def _write_by_rcl(_: LogLevel, name: str, text: str) -> None:
-    from rclpy.logging import get_logger  # noqa: PLC0415 - the rest of the module needs no ROS
-
-    get_logger(name).error(text)
-
-
 def exception_log(
-    clock: Clock, write: Callable[[LogLevel, str, str], None] = _write_by_rcl
+    clock: Clock, write: Callable[[LogLevel, str, str], None]
 ) -> Callable[[str, BaseException], None]:
     """Return a function that logs an exception that left a callback, by the name of the callback.
 

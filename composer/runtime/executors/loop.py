@@ -19,7 +19,6 @@ from rclpy.task import Future as RclpyFuture
 from composer.model import ExecutorKind
 from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.executors.actions import ActionSource
-from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.scheduler import Scheduler
 from composer.runtime.executors.sources import (
@@ -44,7 +43,7 @@ class Loop(Scheduler):
     def __init__(
         self,
         name: str,
-        on_exception: Report | None = None,
+        on_exception: Report,
         kind: ExecutorKind = ExecutorKind.EVENTS,
         threads: int = 1,
         clock: Clock = COMPUTER,
@@ -52,9 +51,9 @@ class Loop(Scheduler):
         """Create a loop, not started, for an executor of this name in YAML.
 
         ``threads`` counts for ``multi_threaded`` only. The loop of a system has the ``clock`` of
-        the system. Exceptions are logged by default. rclpy must be initialized.
+        the system. rclpy must be initialized.
         """
-        super().__init__(name, on_exception or exception_log(clock), kind, threads, clock)
+        super().__init__(name, on_exception, kind, threads, clock)
         self._group_of: dict[object, SourceGroup] = {}  # by the entity that was added
         #: What runs rclpy's own code, to which nodes refer weakly, and their services.
         self._nodes: dict[Node, tuple[NodeExecutor, SourceGroup]] = {}

@@ -69,7 +69,7 @@ class HostedNode(LocalNode):
         loop: Loop,
         options: NodeOptions,
         listener: NodeListener,
-        statistics: Statistics | None = None,
+        statistics: Statistics,
     ) -> None:
         """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
         install()

@@ -70,10 +70,9 @@ class LocalNode(ManagedNode):
         loop: Loop,
         options: NodeOptions,
         listener: NodeListener,
-        statistics: Statistics | None = None,
+        statistics: Statistics,
     ) -> None:
         """Continue ``statistics``."""
-        statistics = Statistics() if statistics is None else statistics
         super().__init__(model, loop, statistics, options.transition_timeout_s)
         self._listener = listener
         self._system_is_up = options.system_is_up

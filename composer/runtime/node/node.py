@@ -59,7 +59,7 @@ class RunningNode(LocalNode):
         loop: Loop,
         options: NodeOptions,
         listener: NodeListener,
-        statistics: Statistics | None = None,
+        statistics: Statistics,
     ) -> None:
         """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
         super().__init__(model, loop, options, listener, statistics)
@@ -117,7 +117,7 @@ class RunningNode(LocalNode):
             behavior.transforms = entities.transforms
         if not hasattr(behavior, "fail"):
             behavior.fail = self.fail
-        if self._make_library_node is not None and not hasattr(behavior, "node"):
+        if not hasattr(behavior, "node"):
             library: LibraryNode = self._make_library_node(self)
             self._library, entities.of_libraries = library, library.entities
             behavior.node = library.node

@@ -47,11 +47,11 @@ class NodeOptions:
     router: LocalRouter
     chains: Chains
     process: ProcessContext
-    seen_messages: MessageSnapshots | None = None
-    transition_timeout_s: float = 10.0
-    system_is_up: bool = False
-    make_library_node: Callable[[Any], Any] | None = None
-    instruments: Instruments | None = None
+    seen_messages: MessageSnapshots | None
+    transition_timeout_s: float
+    system_is_up: bool
+    make_library_node: Callable[[Any], Any]
+    instruments: Instruments | None
 
 
 #: rmw's profile of parameter events.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from composer.model import (
     PrimaryState,
@@ -141,10 +140,6 @@ class NodeSet:
             for node in tuple(self.nodes.values())
             for callback in tuple(node.statistics.callbacks.values())
         )
-
-    def reported_figures(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return what is known of the nodes outside the process, by fields of ``NodeReport``."""
-        return {name: node.figures for name, node in tuple(self.nodes.items())}
 
     def summaries(self) -> tuple[NodeSummary, ...]:
         """Return the states and the counters of all nodes."""

@@ -15,6 +15,7 @@ from composer.plan import optional_nodes, start_goals
 from composer.runtime.clock.clock import COMPUTER, Clock
 from composer.runtime.metrics.figures import CountedRate
 from composer.runtime.metrics.statistics import Statistics
+from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 #: Characters of a text that user code or another node may have made long.
@@ -61,8 +62,8 @@ class Status:
         self.clock = clock
         self._lock = threading.Lock()
         self._changed: Callable[[], None] = lambda: None
-        self._statistics: Mapping[str, Statistics] = {}
-        self._reported: Mapping[str, Mapping[str, Any]] = {}
+        #: The counters of each node, and what is known of those outside the process.
+        self._measured: Mapping[str, tuple[Statistics, Mapping[str, Any]]] = {}
         now_s = COMPUTER.time()  # as the readers of reports have it
         models = {node.name.value: node for node in system.nodes}
         self._rates = {name: _NodeRates(clock) for name, node in models.items() if node.in_process}
@@ -161,28 +162,20 @@ class Status:
             self._nodes[name] = replace(node, restarts=node.restarts + 1)
         self._changed()
 
-    def measure(
-        self,
-        statistics: Mapping[str, Statistics],
-        reported: Mapping[str, Mapping[str, Any]] | None = None,
-    ) -> None:
-        """Read the counters of the nodes for their rates.
-
-        ``reported`` is what is known of nodes outside the process, by fields of ``NodeReport``.
-        """
+    def measure(self, nodes: Mapping[str, ManagedNode]) -> None:
+        """Read the counters of nodes, by their keys."""
         with self._lock:
-            self._statistics = statistics
-            self._reported = reported or {}
+            self._measured = {name: (node.statistics, node.figures) for name, node in nodes.items()}
             for name, rates in self._rates.items():
-                if name in statistics:
-                    rates.read(statistics[name])
+                if name in nodes:
+                    rates.read(nodes[name].statistics)
 
     def _with_counters(self, name: str, node: NodeReport) -> NodeReport:
-        counters = self._statistics.get(name)
-        if counters is not None:
-            node = self._counted(name, node, counters)
-        reported = self._reported.get(name)
-        return replace(node, **reported) if reported else node
+        if name not in self._measured:
+            return node
+        counters, reported = self._measured[name]
+        counted = self._counted(name, node, counters)
+        return replace(counted, **reported) if reported else counted
 
     def _counted(self, name: str, node: NodeReport, counters: Statistics) -> NodeReport:
         rates = self._rates[name].current() if name in self._rates else {}

@@ -15,7 +15,7 @@ from composer.model import Executor, ExecutorKind
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.placement import place_threads
 from tests.ros.support.in_process import running
-from tests.ros.support.loops import PATIENCE_S
+from tests.ros.support.loops import PATIENCE_S, print_error
 
 NOWHERE = Span(SourceFile("nowhere.yaml", ""), 1, 1, 1)
 CPU = min(os.sched_getaffinity(0))
@@ -45,7 +45,7 @@ def ros() -> Iterator[None]:
 @pytest.mark.parametrize("kind", list(ExecutorKind))
 def test_every_thread_of_an_executor_is_placed(kind: ExecutorKind) -> None:
     wanted = executor(kind, cpus=(CPU,), priority=7, threads=3)
-    loop = Loop(wanted.name.value, None, kind, wanted.threads)
+    loop = Loop(wanted.name.value, print_error, kind, wanted.threads)
     loop.start()
     try:
         refused = place_threads(wanted, loop.native_thread_ids())

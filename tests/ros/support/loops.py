@@ -62,7 +62,11 @@ class Bench:
         return client
 
 
-def loop_of(kind: ExecutorKind, on_exception: Report | None = None) -> Loop:
+def print_error(what: str, error: BaseException) -> None:
+    print(f"{what}: {error!r}")
+
+
+def loop_of(kind: ExecutorKind, on_exception: Report = print_error) -> Loop:
     return Loop("default", on_exception, kind, threads=3)
 
 
