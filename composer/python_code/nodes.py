@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import TypeAlias
 
 from composer import behavior
-from composer.base.diagnostics import Diagnostic, Label, Rule
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import Located, Span
+from composer.base.source import Located
 from composer.language.tree_values import is_opaque
-from composer.model import HostedClass, Node, Parameter, Port, PortKind, System
+from composer.model import Node, Parameter, Port, PortKind, System
 from composer.model.resolve.parameters import rclpy_type
 from composer.python_code.lookup import BehaviorSource, find_behavior
 from composer.python_code.scopes import Scope
 from composer.python_code.syntax import Method, scopes_in
-from composer.python_code.trees import SCOPES, argument, span_of, walk
+from composer.python_code.trees import argument, span_of, walk
 
 #: A node, and the source of its behavior or class.
 NodeClass: TypeAlias = tuple[Node, BehaviorSource]
@@ -29,13 +28,6 @@ API_CLASSES = frozenset(
     if isinstance(item, type) and item.__module__ == behavior.__name__
 )
 _PUBLISH = re.compile(r"self\.publishers\.(\w+)\.publish")
-_PREFIXES = ("on_", "accept_")
-#: What may leave out the code in it, or stop it.
-_CONDITIONAL = (
-    *SCOPES,
-    *(ast.If, ast.IfExp, ast.BoolOp, ast.Match, ast.Try, ast.TryStar, ast.With),
-    *(ast.For, ast.While, ast.ListComp, ast.GeneratorExp),
-)
 _DECLARING = frozenset({"declare_parameter", "declare_parameters"})
 #: With one of these, parameters exist that the class does not declare by name.
 UNDECLARED = frozenset(
@@ -159,28 +151,6 @@ def _is_needed(port: Port) -> bool:
     return not port.reactions
 
 
-def unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
-    """Return the methods called ``on_...`` or ``accept_...`` that nothing calls.
-
-    One that the code itself uses, such as ``on_feedback=self.on_progress``, is not a handler.
-    """
-    called = {handler.name for handler in handlers(node)} | GENERAL_HANDLERS.keys()
-    unbound = [
-        method
-        for method in source.methods
-        if method.name.startswith(_PREFIXES) and method.name not in called
-    ]
-    if not unbound:
-        return []
-    used = {
-        inner.attr
-        for module in source.own_modules
-        for inner in ast.walk(module.tree)
-        if isinstance(inner, ast.Attribute)
-    }
-    return [method for method in unbound if method.name not in used]
-
-
 def reached_methods(source: BehaviorSource, *methods: Method) -> Iterator[Method]:
     """Yield ``methods``, and the methods of their class that they call, directly or not."""
     pending, seen = list(methods), {method.name for method in methods}
@@ -200,41 +170,6 @@ def called_methods(source: BehaviorSource, method: Method) -> Iterator[Method]:
         callee = source.method(call.name.removeprefix("self.")) if is_own else None
         if callee is not None:
             yield callee
-
-
-@dataclass(frozen=True, slots=True)
-class ClassOfNode:
-    """A node with the source of its class."""
-
-    node: Node
-    hosted: HostedClass
-    source: BehaviorSource
-
-    @property
-    def span(self) -> Span:
-        """Where the YAML file names the class."""
-        return self.hosted.reference.text.span
-
-    @property
-    def constructor(self) -> Method | None:
-        """The constructor of the class or of its bases outside of rclpy, if it is known."""
-        method = self.source.method("__init__")
-        is_nearest = any(method in class_.methods for _, class_ in self.source.classes[:1])
-        return method if is_nearest or self.source.complete else None
-
-    def is_certain(self, span: Span) -> bool:
-        """Return whether the constructor makes the call at a place whatever happens before."""
-        constructor = self.constructor
-        if constructor is None or constructor.node is None or constructor.span.file != span.file:
-            return False
-        nodes = walk(constructor.node.body, closed=_CONDITIONAL)
-        calls = (span_of(node, span.file) for node in nodes if isinstance(node, ast.Call))
-        return any((call.line, call.column) == (span.line, span.column) for call in calls)
-
-    def diagnostic(self, rule: Rule, message: str, where: Span, hint: str) -> Diagnostic:
-        """Return a diagnostic about the class, with its place in the Python file."""
-        related = (Label(where, "here"),)
-        return Diagnostic(rule, message, self.span, related=related, hint=hint)
 
 
 @dataclass(slots=True)

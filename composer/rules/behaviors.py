@@ -16,7 +16,6 @@ from composer.python_code.nodes import (
     Handler,
     handlers,
     reached_methods,
-    unbound_handlers,
 )
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method, scopes_in
@@ -47,6 +46,9 @@ HANDLER_SIGNATURE = error("RC435", "handler-signature")
 BLOCKING_CALL = warning("RC436", "blocking-call")
 WRONG_CLASS = error("RC462", "wrong-class")
 
+#: How the names of handlers begin.
+_PREFIXES = ("on_", "accept_")
+
 
 def check_handlers(context: Context) -> Iterator[Diagnostic]:
     """Compare the ports and timers of nodes with the methods of their behaviors."""
@@ -61,7 +63,7 @@ def check_handlers(context: Context) -> Iterator[Diagnostic]:
 def _unbound(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     """Report the ports and timers without a handler, and the handlers without a port."""
     bound = list(handlers(node))
-    unbound = {method.name: method for method in unbound_handlers(node, source)}
+    unbound = {method.name: method for method in _unbound_handlers(node, source)}
     missing = [item for item in bound if item.needed and source.method(item.name) is None]
     for handler in missing:
         yield _missing(node, source, handler, unbound)
@@ -76,6 +78,28 @@ def _unbound(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
         yield Diagnostic(
             HANDLER_WITHOUT_PORT, message, method.span, (label,), hint, relies_on=given
         )
+
+
+def _unbound_handlers(node: Node, source: BehaviorSource) -> list[Method]:
+    """Return the methods called ``on_...`` or ``accept_...`` that nothing calls.
+
+    One that the code itself uses, such as ``on_feedback=self.on_progress``, is not a handler.
+    """
+    called = {handler.name for handler in handlers(node)} | GENERAL_HANDLERS.keys()
+    unbound = [
+        method
+        for method in source.methods
+        if method.name.startswith(_PREFIXES) and method.name not in called
+    ]
+    if not unbound:
+        return []
+    used = {
+        inner.attr
+        for module in source.own_modules
+        for inner in ast.walk(module.tree)
+        if isinstance(inner, ast.Attribute)
+    }
+    return [method for method in unbound if method.name not in used]
 
 
 def _missing(

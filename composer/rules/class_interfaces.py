@@ -17,9 +17,9 @@ from composer.model import (
     PortKind,
 )
 from composer.model.qos import incompatibilities
-from composer.python_code.nodes import ClassOfNode, declared_parameters, passes_node_on
+from composer.python_code.nodes import declared_parameters, passes_node_on
 from composer.rules.analysis.class_ports import CreatedPort, all_created_ports, created_ports
-from composer.rules.analysis.context import Context, distinct_classes, hosted_classes
+from composer.rules.analysis.context import ClassOfNode, Context, distinct_classes, hosted_classes
 from composer.rules.analysis.subjects import type_subject
 from composer.rules.python import as_warning
 
@@ -45,11 +45,11 @@ def check_interfaces(context: Context) -> Iterator[Diagnostic]:
 
 def _created_ports(context: Context) -> dict[int, list[CreatedPort]]:
     """Return what each class creates, by the identity of its source; nodes may share a class."""
-    return {id(item.source): list(created_ports(item)) for item in distinct_classes(context)}
+    return {id(item.source): list(created_ports(item.source)) for item in distinct_classes(context)}
 
 
 def _all_created_ports(context: Context) -> dict[int, list[CreatedPort] | None]:
-    return {id(item.source): all_created_ports(item) for item in distinct_classes(context)}
+    return {id(item.source): all_created_ports(item.source) for item in distinct_classes(context)}
 
 
 def _missing_ports(item: ClassOfNode, context: Context) -> Iterator[Diagnostic]:

@@ -8,11 +8,10 @@ from collections.abc import Iterator
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.model import ExecutorKind, Node, System
 from composer.model.dependencies import dependency_edges
-from composer.python_code.nodes import ClassOfNode
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method
 from composer.python_code.trees import SCOPES, is_none, span_of, walk
-from composer.rules.analysis.context import Context, hosted_classes
+from composer.rules.analysis.context import ClassOfNode, Context, hosted_classes
 from composer.rules.behaviors import BLOCKING_CALL, WRONG_CLASS
 from composer.rules.python import NOT_INSTALLED, as_warning, missing, unnamed
 

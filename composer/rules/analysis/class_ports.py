@@ -10,7 +10,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.model import PortKind
 from composer.model.qos import DURATIONS, PRESETS, WORDS, QosProfile
-from composer.python_code.nodes import ClassOfNode, calls_on_self, passes_node_on
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import calls_on_self, passes_node_on
 from composer.python_code.scopes import NotLiteral, Scope
 from composer.python_code.trees import argument, dotted, span_of, walk
 
@@ -54,9 +55,9 @@ class CreatedPort:
     overridable: frozenset[str]
 
 
-def created_ports(node_class: ClassOfNode) -> Iterator[CreatedPort]:
+def created_ports(source: BehaviorSource) -> Iterator[CreatedPort]:
     """Yield the ports that a class creates by methods of Node."""
-    for scope, call, method in calls_on_self(node_class.source):
+    for scope, call, method in calls_on_self(source):
         if method not in CREATORS:
             continue
         kind, names = CREATORS[method]
@@ -90,15 +91,14 @@ def _overridable(scope: Scope, call: ast.Call) -> frozenset[str]:
     return frozenset({*WORDS, *_DURATIONS.values(), "depth"})
 
 
-def all_created_ports(node_class: ClassOfNode) -> list[CreatedPort] | None:
+def all_created_ports(source: BehaviorSource) -> list[CreatedPort] | None:
     """Return all ports that a class creates by methods of Node.
 
     None: it may create others, since a name is computed, or since other code gets the node.
     """
-    source = node_class.source
     if not source.complete or passes_node_on(source, frozenset({"rclpy"})):
         return None
-    ports = list(created_ports(node_class))
+    ports = list(created_ports(source))
     if any(port.name is None for port in ports):
         return None
     mentioned = sum(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field, replace
 from functools import wraps
 from itertools import islice
 from typing import Any, TypeAlias, TypeVar
 
-from composer.base.diagnostics import Diagnostic, Severity
+from composer.base.diagnostics import Diagnostic, Label, Rule, Severity
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
@@ -16,12 +17,22 @@ from composer.interfaces.definitions import parts
 from composer.language.document.limits import MAX_FINDINGS
 from composer.language.expressions import Expression, FieldPath
 from composer.language.rules import TOO_LARGE
-from composer.model import Channel, ChannelKind, Port, System, channels
+from composer.model import Channel, ChannelKind, HostedClass, Node, Port, System, channels
 from composer.model.scenario import Scenario
 from composer.project.node_types import NodeTypes
-from composer.python_code.nodes import ClassOfNode, NodeClass, node_classes, use_of
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.nodes import NodeClass, node_classes, use_of
+from composer.python_code.syntax import Method
+from composer.python_code.trees import SCOPES, span_of, walk
 
 T = TypeVar("T")
+
+#: What may leave out the code in it, or stop it.
+_CONDITIONAL = (
+    *SCOPES,
+    *(ast.If, ast.IfExp, ast.BoolOp, ast.Match, ast.Try, ast.TryStar, ast.With),
+    *(ast.For, ast.While, ast.ListComp, ast.GeneratorExp),
+)
 
 #: The kinds of channels that use each kind of definition.
 KINDS_OF_INTERFACES = {
@@ -140,6 +151,41 @@ def distinct_behaviors(context: Context) -> tuple[NodeClass, ...]:
     for node, source in behaviors(context):
         first.setdefault(use_of(node, source), (node, source))
     return tuple(first.values())
+
+
+@dataclass(frozen=True, slots=True)
+class ClassOfNode:
+    """A node with the source of its class."""
+
+    node: Node
+    hosted: HostedClass
+    source: BehaviorSource
+
+    @property
+    def span(self) -> Span:
+        """Where the YAML file names the class."""
+        return self.hosted.reference.text.span
+
+    @property
+    def constructor(self) -> Method | None:
+        """The constructor of the class or of its bases outside of rclpy, if it is known."""
+        method = self.source.method("__init__")
+        is_nearest = any(method in class_.methods for _, class_ in self.source.classes[:1])
+        return method if is_nearest or self.source.complete else None
+
+    def is_certain(self, span: Span) -> bool:
+        """Return whether the constructor makes the call at a place whatever happens before."""
+        constructor = self.constructor
+        if constructor is None or constructor.node is None or constructor.span.file != span.file:
+            return False
+        nodes = walk(constructor.node.body, closed=_CONDITIONAL)
+        calls = (span_of(node, span.file) for node in nodes if isinstance(node, ast.Call))
+        return any((call.line, call.column) == (span.line, span.column) for call in calls)
+
+    def diagnostic(self, rule: Rule, message: str, where: Span, hint: str) -> Diagnostic:
+        """Return a diagnostic about the class, with its place in the Python file."""
+        related = (Label(where, "here"),)
+        return Diagnostic(rule, message, self.span, related=related, hint=hint)
 
 
 def hosted_classes(context: Context) -> tuple[ClassOfNode, ...]:
