@@ -153,11 +153,11 @@ def test_links_out_of_the_project_are_not_followed(tmp_path: Path) -> None:
     assert "confidential" not in result.out + result.err
 
 
-@pytest.mark.parametrize("report", ["text", "json", "sarif", "github"])
-def test_file_names_with_control_characters_are_escaped(tmp_path: Path, report: str) -> None:
+def test_file_names_with_control_characters_are_escaped(tmp_path: Path) -> None:
     names = [b"\x1b]0;pwn\x07.yaml", b"\xff\xfe.yaml", b"\xe2\x80\xae.yaml"]
     for name in names:
         (tmp_path / os.fsdecode(name)).write_text("system: [\n")
     (tmp_path / "\x1b[2J.yaml").write_text("foreign: true\n")
-    assert validate(tmp_path, ".", "--format", report).code == 1
+    for report in ("text", "json", "sarif", "github"):
+        assert validate(tmp_path, ".", "--format", report).code == 1
     assert validate(tmp_path, "\x1b[2J missing.yaml").code == 2

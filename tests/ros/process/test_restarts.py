@@ -119,7 +119,7 @@ def settled(measure: Callable[[], Usage], expected: Usage) -> Usage:
 @pytest.mark.parametrize(
     "restarts",
     [
-        pytest.param(3, marks=pytest.mark.slow),
+        pytest.param(2, marks=pytest.mark.slow),
         pytest.param(200, marks=[pytest.mark.soak, pytest.mark.timeout(3600)]),
     ],
 )
