@@ -36,6 +36,13 @@ def reactions(system: System) -> Iterator[ReactionSite]:
             yield ReactionSite(node, event, reaction)
 
 
+#: The kinds of ports that the keys of a reaction send through.
+SENDERS = {
+    "publish": (PortKind.PUBLISHER,),
+    "call": (PortKind.CLIENT, PortKind.ACTION_CLIENT),
+}
+
+
 def sends(system: System) -> Iterator[tuple[ReactionSite, str, Send]]:
     """Yield every message, request and goal that reactions send, with its key in the YAML."""
     for site in reactions(system):
