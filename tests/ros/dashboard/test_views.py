@@ -73,7 +73,8 @@ def test_the_log_begins_with_what_was_logged_before(page: Browser, tmp_path: Pat
     with RunningSystem(str(file)) as system:
         system.wait_for("1 of 1 nodes active")
         (run,) = find_runs(Path(os.environ["ROS_LOG_DIR"]), "silent")
-        wait_until(lambda: last_records(run, 10_000)[-1].message.startswith("1 of 1 nodes active"))
+        active = "1 of 1 nodes active"
+        wait_until(lambda: any(active in item.message for item in last_records(run, 10_000)))
         channel = page.subscribe("log", node="/silent")
         (line,) = page.until(channel, lambda data: data["lines"])["lines"]
         assert (line["level"], line["text"]) == ("info", "before the page")
