@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -233,7 +234,18 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("begin", "part", "end"), LARGE_FILES.values(), ids=LARGE_FILES)
-def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        (25_000, 200_000),
+        pytest.param(
+            (100_000, 300_000, 1_000_000), marks=[pytest.mark.soak, pytest.mark.timeout(300)]
+        ),
+    ],
+)
+def test_large_files(
+    tmp_path: Path, begin: str, part: str, end: str, sizes: tuple[int, ...]
+) -> None:
     """Also beyond the limits."""
 
     def validate(size: int) -> None:
@@ -242,7 +254,8 @@ def test_large_files(tmp_path: Path, begin: str, part: str, end: str) -> None:
         content = f"system: large\n{begin}{text}{end}".encode()
         load_bytes(content, tmp_path, shown="large.yaml")
 
-    assert_linear(validate, 25_000, 200_000)
+    for small, large in pairwise(sizes):
+        assert_linear(validate, small, large)
 
 
 SECTION = "/n#: {ros__parameters: {a: 1}}\n"
