@@ -16,6 +16,8 @@ from composer.runtime.process.watchdog import signal_watchdog
 
 IN_ORDER = 7
 GRACE_S = 3.0
+#: Signals that come later than this do not arrive as they are meant to: this computer is busy.
+LATE_S = 0.05
 #: Python code on the main thread, which handles signals and does not wait for them.
 BUSY = """
 print("holding", flush=True)
@@ -70,6 +72,16 @@ os._exit(7)
 def test_a_process_that_ends_in_order(
     thread: str, code: str, steps: tuple[tuple[int, float], ...]
 ) -> None:
+    late_s = LATE_S
+    while late_s >= LATE_S:
+        ended, late_s = _ended_by(thread, code, steps)
+    assert ended == (IN_ORDER, "")
+
+
+def _ended_by(
+    thread: str, code: str, steps: tuple[tuple[int, float], ...]
+) -> tuple[tuple[int, str], float]:
+    """Return how a process ends after these signals, and how much later they were sent."""
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, thread, code],
         stdout=subprocess.PIPE,
@@ -78,11 +90,13 @@ def test_a_process_that_ends_in_order(
     ) as process:
         assert process.stdout is not None
         process.stdout.readline()
+        begun_s = time.monotonic()
         for number, pause_s in steps:
             process.send_signal(number)
             time.sleep(pause_s)  # the times of the signals are what is tested
+        late_s = time.monotonic() - begun_s - sum(pause_s for _, pause_s in steps)
         _, errors = process.communicate(timeout=60.0)
-    assert (process.returncode, errors) == (IN_ORDER, "")
+    return (process.returncode, errors), late_s
 
 
 def _children(process: int) -> list[int]:
