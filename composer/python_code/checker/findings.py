@@ -60,7 +60,6 @@ _ASSIGNMENT = (
     r"`(?P<expected>.+?)`"
 )
 MISSING_RETURN = "missing an explicit `return`"
-_NAME = r"Could not find name `(\w+)`"
 _CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
@@ -142,8 +141,6 @@ class Reader:
             return self._none()
         if named == "Coroutine":
             return self._unawaited_value()
-        if named == "property":
-            return None  # a class instead of a message, which is reported where it is sent
         node = self.code.expression_at(self.span)
         module = self.code.module
         is_own = named in module.classes
@@ -211,16 +208,14 @@ class Reader:
             rf"Unexpected keyword argument `(\w+)` in function `{_OF_MESSAGE}`",
             self.finding.message,
         )
-        if called is None:
+        homes = self.known.owners.messages.get(called[4], {}) if called is not None else {}
+        members = homes.get(f"{called[2]}.{called[3]}") if called is not None else None
+        if called is None or members is None:
             return self._in_its_words()
-        members = self.known.owners.messages[called[4]][f"{called[2]}.{called[3]}"]
         return self._in_its_words(Family.FIELD, Owner(Family.FIELD, members).hint(called[1]))
 
     def _name(self) -> Problem | None:
-        found = re.search(_NAME, self.finding.message)
-        if found is None:
-            return self._in_its_words()
-        name = found[1]
+        name = self.span.text
         if name == "self" and self.code.class_at(self.span.line) is not None:
             return self._missing_self()
         if name in sys.stdlib_module_names:

@@ -50,7 +50,7 @@ _OFF_BY_DEFAULT = (
 TIME_LIMIT_S = 60.0
 #: Outputs that are kept, and the most bytes of one.
 _MAXIMUM_ENTRIES = 500
-_MAXIMUM_BYTES = 16_000_000
+_MAXIMUM_BYTES = 1_000_000
 #: The files that the checker writes.
 _OUTPUTS = ("output.json", "errors.txt")
 #: Seconds of processor time, and how many more for each megabyte. Usual code takes a tenth of it.
@@ -247,7 +247,9 @@ def _read_entry(entry: Path) -> bytes | None:
 
 
 def _keep_entry(entry: Path, output: bytes) -> None:
-    """Keep an output; the oldest entries make room."""
+    """Keep an output, unless it is too large; the oldest entries make room."""
+    if len(output) > _MAXIMUM_BYTES:
+        return
     with suppress(OSError):
         entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         _remove_oldest(entry.parent)
