@@ -19,7 +19,7 @@ RESULT_MARK = "RESULT "  # prefix of the line with the result of a program
 STARTED_LINE = "STARTED"  # printed at the start of a measurement without a fixed duration
 _LOWEST_DOMAIN_ID, _DOMAIN_IDS = 30, 70  # ports of IDs above 101 may collide with ephemeral ports
 
-_domain_ids = itertools.cycle(
+domain_ids = itertools.cycle(
     _LOWEST_DOMAIN_ID + (os.getpid() + step) % _DOMAIN_IDS for step in range(_DOMAIN_IDS)
 )
 
@@ -32,7 +32,7 @@ def environment() -> Mapping[str, str]:
     """Return an environment with a new ROS domain ID, restricted to this machine."""
     return {
         **os.environ,
-        "ROS_DOMAIN_ID": str(next(_domain_ids)),
+        "ROS_DOMAIN_ID": str(next(domain_ids)),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
 

@@ -22,7 +22,7 @@ from composer.runtime.ros_graph.endpoints import TopicInfo
 #: Latched messages of a topic, and what arrives while this program is busy.
 _DEPTH = 1000
 #: Topics that are recorded or refused. Any program of the domain can create more.
-_MAX_TOPICS = 1000
+MAX_TOPICS = 1000
 
 
 class GraphRecording:
@@ -56,7 +56,7 @@ class GraphRecording:
             if is_hidden(owner_of_topic(name)[1]) or name in self._refused:
                 continue
             is_new = name not in self._subscriptions
-            if is_new and len(self._subscriptions) + len(self._refused) >= _MAX_TOPICS:
+            if is_new and len(self._subscriptions) + len(self._refused) >= MAX_TOPICS:
                 self._warn_of_limit()
                 continue
             info = self._session.graph.topic(name, types)
@@ -98,7 +98,7 @@ class GraphRecording:
     def _warn_of_limit(self) -> None:
         if not self._is_limited:
             self._is_limited = True
-            self._warn(f"there are more than {_MAX_TOPICS:,} topics: no further ones are recorded")
+            self._warn(f"there are more than {MAX_TOPICS:,} topics: no further ones are recorded")
 
     def _refuse(self, name: str, reason: str) -> None:
         self._refused.add(name)

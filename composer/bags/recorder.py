@@ -19,7 +19,7 @@ from composer.runtime.clock.clock import Clock
 _SERIALIZE_PERIOD_S = 0.02
 _WRITE_PERIOD_S = 0.1
 #: Serialized messages that wait for the sink.
-_LARGEST_PENDING_BYTES = 256_000_000
+LARGEST_PENDING_BYTES = 256_000_000
 #: Messages of one source that wait to be serialized.
 _LARGEST_QUEUE_BYTES = 64_000_000
 _SHORTEST_QUEUE, _LONGEST_QUEUE = 16, 10_000
@@ -178,7 +178,7 @@ class Recorder:
                     source.dropped += 1
                     continue
                 source.note_size(len(data))
-                if self._serialized_bytes - self._written_bytes > _LARGEST_PENDING_BYTES:
+                if self._serialized_bytes - self._written_bytes > LARGEST_PENDING_BYTES:
                     if not self._clock.is_virtual:
                         source.dropped += 1
                         continue

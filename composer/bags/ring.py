@@ -9,7 +9,7 @@ from composer.bags.writer import BagWriter
 from composer.model.qos import Durability
 
 #: The memory for the messages of a system; the oldest are discarded earlier if need be.
-_LARGEST_BYTES = 256_000_000
+LARGEST_BYTES = 256_000_000
 
 
 class Ring:
@@ -31,7 +31,7 @@ class Ring:
         self._messages.append(message)
         self._size_bytes += message.memory_bytes
         oldest_ns = message.recorded_ns - self._length_ns
-        while self._messages[0].recorded_ns < oldest_ns or self._size_bytes > _LARGEST_BYTES:
+        while self._messages[0].recorded_ns < oldest_ns or self._size_bytes > LARGEST_BYTES:
             self._discard()
 
     def flush_if_due(self) -> None:

@@ -13,14 +13,14 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def data_folder() -> Path:
     """Return the folder that the other ones are in."""
-    share = _PACKAGE / "share"
+    share = PACKAGE / "share"
     # The wheel first: `nodes` next to an installed package would belong to another distribution.
-    return share if share.is_dir() else _PACKAGE.parent
+    return share if share.is_dir() else PACKAGE.parent
 
 
 def schemas_folder() -> Path:

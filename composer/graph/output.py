@@ -15,7 +15,7 @@ from composer.graph.layout import arrange
 
 #: Pixels per layout unit for high-resolution screens, reduced for very large pictures.
 _ZOOM = 2.0
-_MAX_PIXELS = 40_000_000
+MAX_PIXELS = 40_000_000
 #: resvg draws no text if it knows none of the fonts of the SVG, and its own default is Arial.
 _FALLBACK_FONT = "DejaVu Sans"
 
@@ -51,7 +51,7 @@ def _png(graph: Graph) -> bytes:
 
     layout = arrange(graph)
     pixels = layout.size.width * layout.size.height
-    zoom = min(_ZOOM, math.sqrt(_MAX_PIXELS / max(pixels, 1.0)))
+    zoom = min(_ZOOM, math.sqrt(MAX_PIXELS / max(pixels, 1.0)))
     width, _ = svg.page_size(graph, layout)
     drawn = resvg_py.svg_to_bytes(
         svg_string=svg.render(graph, layout),

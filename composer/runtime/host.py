@@ -216,7 +216,7 @@ class Host:
             status=self._status,
             report_key=self._report_key,
             on_command=self._on_command,
-            on_older_instance=partial(self._on_older_instance, namespace),
+            on_older_instance=partial(self.on_older_instance, namespace),
             update_status=self._update_status,
             callbacks=self._node_set.callbacks,
             chains=self._node_set.chains,
@@ -341,7 +341,8 @@ class Host:
         else:
             self._options.recorder.save(done)
 
-    def _on_older_instance(self, namespace: str, instance: Instance) -> None:
+    def on_older_instance(self, namespace: str, instance: Instance) -> None:
+        """End the run, because the system already runs elsewhere; its nodes stay as they are."""
         self._node_set.leave_others()
         if not self._main_queue.stopping:
             self._fail(str(already_running(namespace, instance.host, instance.pid)))

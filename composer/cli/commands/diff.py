@@ -137,9 +137,9 @@ def _watched(
             drifts = compare(observer.snapshot(Deadline(timeout_s)))
             change = debouncer.update(time.monotonic(), drifts)
             for drift in change.resolved:
-                write(_event("resolved", drift, json=json))
+                write(event_text("resolved", drift, json=json))
             for drift in change.appeared:
-                write(_event("drift", drift, json=json))
+                write(event_text("drift", drift, json=json))
             time.sleep(_PAUSE_S)
     except KeyboardInterrupt:
         pass  # the normal way to stop
@@ -157,7 +157,8 @@ def _print(system: System, drifts: tuple[Drift, ...], *, json: bool) -> None:
     say(f"{system.name.value}: {differences if drifts else 'runs as declared'}")
 
 
-def _event(what: str, drift: Drift, *, json: bool) -> str:
+def event_text(what: str, drift: Drift, *, json: bool) -> str:
+    """Return a difference that has come or gone, as text or as a line of JSON."""
     if json:
         return as_json({"event": what, **drift.plain()})
     return lines(

@@ -71,7 +71,7 @@ def doctor(
     for result in _check_all(declared, timeout):
         results.append(result)
         if not json:
-            write(_text(result))
+            write(result_text(result))
     if json:
         write(as_json([asdict(result) for result in results], indent=2))
     errors, warnings = (
@@ -174,7 +174,8 @@ def _check_live_graph(timeout: float) -> Iterator[CheckResult]:
         )
 
 
-def _text(result: CheckResult) -> str:
+def result_text(result: CheckResult) -> str:
+    """Return what a check has found, with its remedy."""
     head = f"{result.level.value:<{_LEVEL_WIDTH}}  {result.area:<{_AREA_WIDTH}}  "
     remedy = () if result.remedy is None else (f"{' ' * len(head)}-> {result.remedy}",)
     return lines([head + result.message, *remedy])

@@ -123,7 +123,9 @@ def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
 
     known = [report for report in systems.values() if isinstance(report, SystemReport)]
     processes = {name for report in known for name in report.processes.values()}
-    parts = [_system(name, report, is_listed=name in processes) for name, report in systems.items()]
+    parts = [
+        system_text(name, report, is_listed=name in processes) for name, report in systems.items()
+    ]
     if others:
         rows = [(node, state or "(no response)") for node, state in others.items()]
         title = "other lifecycle nodes" if parts else "lifecycle nodes"
@@ -131,7 +133,7 @@ def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
     return "\n\n".join(parts) or "no system is running"
 
 
-def _system(
+def system_text(
     name: str, report: SystemReport | OtherVersionError | None, *, is_listed: bool = False
 ) -> str:
     """Return the part of a system; ``is_listed`` is whether another one has its nodes."""

@@ -11,7 +11,7 @@ from functools import wraps
 from typing import ParamSpec
 
 #: A busy system delays a key press no longer than this.
-_WITHIN_S = 0.3
+WITHIN_S = 0.3
 
 P = ParamSpec("P")
 Complete = Callable[[str], list[str]]
@@ -73,7 +73,7 @@ def _graph_names(kind: str, incomplete: str) -> list[str]:
     """Return the names of one kind, hidden ones only if they are asked for."""
     from composer.client.systems.local_queries import local_names
 
-    found = local_names(kind, _WITHIN_S, hidden="/_" in incomplete) or ()
+    found = local_names(kind, WITHIN_S, hidden="/_" in incomplete) or ()
     return [name for name, _ in found]
 
 

@@ -85,7 +85,7 @@ def serve(app: AccessCheck, listening: socket.socket, on_ready: Callable[[], Non
     config = uvicorn.Config(
         app,
         http=_GuardedProtocol,
-        ws=_WebSocketProtocol,
+        ws=WebSocketProtocol,
         loop="asyncio",
         lifespan="off",
         interface="asgi3",
@@ -171,7 +171,7 @@ class _Transport:
         return getattr(self._transport, name)
 
 
-class _WebSocketProtocol(WebSocketsSansIOProtocol):
+class WebSocketProtocol(WebSocketsSansIOProtocol):
     """Does not wait long for the other side when a connection ends."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:

@@ -22,7 +22,7 @@ from composer.language.document.scalars import NumberRefused, check_value, resol
 from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe
 
 _BLOCK_STYLES = ("|", ">")
-_LOADER: type[yaml.SafeLoader | yaml.CSafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+LOADER: type[yaml.SafeLoader | yaml.CSafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class Mark(Protocol):
@@ -70,7 +70,7 @@ def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool
 
 def parse_events(text: str) -> Generator[yaml.Event, None, None]:
     """Yield the events of ``text``. Raises yaml.YAMLError; PyYAML's own parser also ValueError."""
-    loader = _LOADER(text)
+    loader = LOADER(text)
     try:
         while (event := loader.get_event()) is not None:
             yield event

@@ -74,7 +74,7 @@ _PENDING = {
 #: An early response is tried again after a millisecond, then after twice as long each time: on a
 #: busy machine, the thread that registers its request may not run for a while.
 _RETRY_AFTER_S = 0.001
-_LAST_RETRY_AFTER_S = 2.0
+LAST_RETRY_AFTER_S = 2.0
 
 
 class ActionSource:
@@ -119,7 +119,7 @@ class ActionSource:
         self._execute(taken, _RETRY_AFTER_S)
 
     def _execute(self, taken: Any, retry_after_s: float) -> None:
-        if retry_after_s < _LAST_RETRY_AFTER_S and self._is_early(taken):
+        if retry_after_s < LAST_RETRY_AFTER_S and self._is_early(taken):
             later = partial(self._execute, taken, 2 * retry_after_s)
             self._loop.call_later(retry_after_s, later)
             return

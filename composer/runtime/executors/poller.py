@@ -50,7 +50,7 @@ def _has_pwait2() -> bool:
     return ctypes.get_errno() == errno.EBADF
 
 
-_HAS_PWAIT2 = _has_pwait2()
+HAS_PWAIT2 = _has_pwait2()
 
 
 def use_precise_wakeups() -> None:
@@ -82,7 +82,7 @@ class Poller:
         self._timeout = memoryview(bytearray(16)).cast("l")
         self._time = memoryview(bytearray(32)).cast("l")
         self._sleep: Callable[[], int] | None = None
-        if _HAS_PWAIT2:
+        if HAS_PWAIT2:
             event = ctypes.create_string_buffer(_EVENT_BYTES)
             epoll_fd = self._epoll.fileno()
             timeout = _pointer(self._timeout)

@@ -27,7 +27,7 @@ from composer.runtime.intra_process.match_flag import checked_match
 _MIDDLEWARES = ("rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
 _TIMEOUT_S = 1.0
 _POLL_PERIOD_S = 0.0005
-_TEST_NODE = "_compose_trial"
+TEST_NODE = "_compose_trial"
 
 
 class _Options(ctypes.Structure):
@@ -86,7 +86,7 @@ def unsupported_reason(context: Context | None = None) -> str | None:
     if middleware not in _MIDDLEWARES:
         return f"{middleware} is not supported"
     node = Node(
-        _TEST_NODE,
+        TEST_NODE,
         context=context,
         enable_rosout=False,
         start_parameter_services=False,
@@ -106,7 +106,7 @@ def unsupported_reason(context: Context | None = None) -> str | None:
 def _self_test(node: Node) -> None:
     """Publish to two subscriptions, and expect that one of them ignores it. Raises NotSupported."""
     profile = QoSProfile(depth=2, reliability=ReliabilityPolicy.RELIABLE)
-    topic = f"{_TEST_NODE}/t{uuid4().hex}"
+    topic = f"{TEST_NODE}/t{uuid4().hex}"
     ignoring = node.create_subscription(Empty, topic, lambda _: None, profile)
     publisher = node.create_publisher(Empty, topic, profile)
     receiving = checked_match(

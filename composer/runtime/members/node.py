@@ -33,7 +33,7 @@ from composer.runtime.protocol.reports import NodeReport
 from composer.runtime.protocol.requests import CREATE, StepResult
 
 #: A report follows a successful response soon; each second there is one in any case.
-_REPORTED_WITHIN_S = 2.0
+REPORTED_WITHIN_S = 2.0
 
 
 class MemberNode(OutsideNode):
@@ -60,7 +60,7 @@ class MemberNode(OutsideNode):
     @property
     def transition_timeout_s(self) -> float:
         """How long a transition may take, including the start of the process."""
-        return self._timeout_s + STARTS_WITHIN_S + _REPORTED_WITHIN_S
+        return self._timeout_s + STARTS_WITHIN_S + REPORTED_WITHIN_S
 
     @property
     def pid(self) -> int | None:
@@ -227,7 +227,7 @@ class MemberNode(OutsideNode):
     async def _wait_for_counters(self, reported: Future[None]) -> None:
         """Wait for the last report, with the final counters; the node is down without it, too."""
         left_s = math.inf if self._end_s is None else self._end_s - self.loop.clock.monotonic()
-        wait_s = min(_REPORTED_WITHIN_S, left_s / 2.0)
+        wait_s = min(REPORTED_WITHIN_S, left_s / 2.0)
         await wait_for(self.loop, reported, max(0.0, wait_s))
 
     async def _wait_for(self, future: Future[Any]) -> None:
@@ -327,7 +327,7 @@ class _LateReports:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._due_s = clock.monotonic() + _REPORTED_WITHIN_S
+        self._due_s = clock.monotonic() + REPORTED_WITHIN_S
         self._count = 0
 
     def count(self) -> None:

@@ -34,15 +34,15 @@ from composer.runtime.ros.manager_interface import RequestService, read_answer, 
 from composer.runtime.ros_graph.graph import participant, servers_of
 
 _MAX_STEPS = 500  # per request; a service takes a million characters
-_MAX_REQUESTS = 8
+MAX_REQUESTS = 8
 _POLL_S = 0.01
 #: After this time, steps are requested again, then after twice as long each time.
 AGAIN_AFTER_S = 3.0
 #: How long to wait for the service of a process that has reported. With other middleware, ids may
 #: differ between processes.
-_DISCOVERED_WITHIN_S = 3.0
+DISCOVERED_WITHIN_S = 3.0
 #: After this time, it is reported that the service of a process cannot be used.
-_READY_WITHIN_S = 3.0
+READY_WITHIN_S = 3.0
 #: A response may be lost, and a killed process is known for 20 s more, with its service.
 _KEY_AGAIN_S = 0.25
 
@@ -113,7 +113,7 @@ class MemberRequests:
         if self._participant != report.participant:
             self._participant = report.participant
             self._is_discovered = self._has_problem = False
-            self._awaited_until_s = self._clock.monotonic() + _DISCOVERED_WITHIN_S
+            self._awaited_until_s = self._clock.monotonic() + DISCOVERED_WITHIN_S
         self._seen = report.number
         if self._unsent:  # an exception may have ended the wait for the service
             self._send()
@@ -158,7 +158,7 @@ class MemberRequests:
         self._send()
 
     def _send(self) -> None:
-        while self._unsent and not self._holds and len(self._sent) < _MAX_REQUESTS:
+        while self._unsent and not self._holds and len(self._sent) < MAX_REQUESTS:
             if not self._is_ready():
                 self._wait_for_service()
                 return
@@ -191,7 +191,7 @@ class MemberRequests:
     def _wait_for_service(self) -> None:
         now_s = self._clock.monotonic()
         self._unready_s = self._unready_s or now_s
-        if now_s - self._unready_s >= _READY_WITHIN_S and not self._has_problem:
+        if now_s - self._unready_s >= READY_WITHIN_S and not self._has_problem:
             self._has_problem = True
             self._on_problem("reports, but its service is not discovered; requests wait")
         if not self._is_polling:

@@ -26,7 +26,7 @@ ALREADY_RUNS = 75  # EX_TEMPFAIL of sysexits.h
 #: The name of the folder of the lock files.
 FOLDER_NAME = f"ros2-composer-{os.geteuid()}"
 #: Services, cron jobs and shells of the same user have this folder in common.
-_COMMON = "/tmp"  # noqa: S108 - the folder in it belongs to the user, or is refused
+COMMON_FOLDER = "/tmp"  # noqa: S108 - the folder in it belongs to the user, or is refused
 #: The folders of login sessions. Services do not have one, and it ends with the last session.
 _SESSIONS = "/run/user/"
 _DEFAULT_DOMAIN = "0"
@@ -219,7 +219,7 @@ def _domain() -> str:
 
 def _folder() -> Path:
     chosen = os.environ.get("XDG_RUNTIME_DIR", "")
-    parent = _COMMON if chosen.startswith(_SESSIONS) else chosen or _COMMON
+    parent = COMMON_FOLDER if chosen.startswith(_SESSIONS) else chosen or COMMON_FOLDER
     return Path(parent, FOLDER_NAME)
 
 

@@ -117,8 +117,8 @@ class QuerySocket:
                 return  # an answer may take half a second, for which the next commands would wait
             answer = self._answers[type(query)](query)
         document = "" if answer is None else encode(answer)
-        connection.settimeout(_TRANSFER_WITHIN_S)
-        connection.sendall(f"{_environment()}\n{document}".encode())  # the limit is for all of it
+        connection.settimeout(_TRANSFER_WITHIN_S)  # the limit is for all of it
+        connection.sendall(f"{discovery_environment()}\n{document}".encode())
 
 
 def ask(system: str, query: Any, timeout_s: float) -> Any:
@@ -137,7 +137,7 @@ def ask(system: str, query: Any, timeout_s: float) -> Any:
             connection.sendall(encode(query).encode() + b"\n")
             received = b"".join(iter(lambda: connection.recv(_READ_BYTES), b""))
         environment, _, document = received.partition(b"\n")
-        is_usable = document and environment == _environment().encode()
+        is_usable = document and environment == discovery_environment().encode()
         return decode(document, query.Answer) if is_usable else None
     except (OSError, ProtocolError):
         return None
@@ -177,5 +177,6 @@ def _listen(path: Path) -> socket.socket | None:
     return listener
 
 
-def _environment() -> str:
+def discovery_environment() -> str:
+    """Return what decides which nodes a process discovers, in one line."""
     return json.dumps([os.environ.get(name, "") for name in _VARIABLES])

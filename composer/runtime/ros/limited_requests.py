@@ -119,33 +119,34 @@ def limited(service: Any) -> Any:
 
 
 def _check_names(address: int) -> str | None:
-    return _over(_Sequence.from_address(address).size, MAX_NAMES, "names")
+    return excess_of(_Sequence.from_address(address).size, MAX_NAMES, "names")
 
 
 def _check_prefixes(address: int) -> str | None:
-    return _over(_Sequence.from_address(address).size, MAX_PARAMETERS, "prefixes")
+    return excess_of(_Sequence.from_address(address).size, MAX_PARAMETERS, "prefixes")
 
 
 def _check_parameters(address: int) -> str | None:
     sequence = _Sequence.from_address(address)
-    reason = _over(sequence.size, MAX_PARAMETERS, "parameters")
+    reason = excess_of(sequence.size, MAX_PARAMETERS, "parameters")
     if reason is not None or not sequence.size:
         return reason
     parameters = (_Parameter * sequence.size).from_address(sequence.data)
     items = sum(part.size for parameter in parameters for part in parameter.sequences)
-    return _over(items, MAX_ITEMS, "array items and characters")
+    return excess_of(items, MAX_ITEMS, "array items and characters")
 
 
 def _check_transition(address: int) -> str | None:
-    return _over(_Transition.from_address(address).label.size, MAX_CHARACTERS, "characters")
+    return excess_of(_Transition.from_address(address).label.size, MAX_CHARACTERS, "characters")
 
 
 def _check_type(address: int) -> str | None:
     name_and_hash = (_Sequence * 2).from_address(address)
-    return _over(sum(text.size for text in name_and_hash), MAX_CHARACTERS, "characters")
+    return excess_of(sum(text.size for text in name_and_hash), MAX_CHARACTERS, "characters")
 
 
-def _over(number: int, limit: int, what: str) -> str | None:
+def excess_of(number: int, limit: int, what: str) -> str | None:
+    """Return the reason to refuse a request with more than ``limit``, or None."""
     return f"{number} {what} in one request, at most {limit}" if number > limit else None
 
 

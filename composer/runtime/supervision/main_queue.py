@@ -52,7 +52,7 @@ K = TypeVar("K")
 #: What remains of any time limit after a second stop request.
 _URGENT_S = 0.05
 #: Tools that forward signals send a second one along with the terminal's; no user is that fast.
-_SAME_REQUEST_S = 0.1
+SAME_REQUEST_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,7 @@ class MainQueue(Generic[T]):
         if self.stop_reason is None:
             self.stop_reason = reason
             self._requested_s = now_s
-        elif now_s - self._requested_s > _SAME_REQUEST_S:
+        elif now_s - self._requested_s > SAME_REQUEST_S:
             self.urgent = True
         self.wakeup.wake()
 

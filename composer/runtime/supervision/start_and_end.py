@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from composer.runtime.host_options import HostOptions
 
 #: Processes report every second. Bring-up waits longer for those that are started only now.
-_REPORTS_WITHIN_S = 5.0
+STARTED_REPORT_WITHIN_S = 5.0
 #: A process that certainly runs is discovered and reports within this time, on a busy machine.
 _RUNNING_REPORT_WITHIN_S = 30.0
 _POLL_S = 0.02
@@ -74,7 +74,7 @@ class SystemStart:
         start_s = queue.clock.monotonic()
         while not processes.are_known and not queue.stopping:
             is_certain = processes.is_running_unknown
-            limit_s = _RUNNING_REPORT_WITHIN_S if is_certain else _REPORTS_WITHIN_S
+            limit_s = _RUNNING_REPORT_WITHIN_S if is_certain else STARTED_REPORT_WITHIN_S
             if queue.clock.monotonic() >= start_s + min(limit_s, within_s):
                 return
             queue.wait(lambda: False, queue.clock.monotonic() + _POLL_S, stoppable=True)

@@ -113,7 +113,7 @@ class Standstill:
 
 
 #: How often the turn is looked at, in seconds of real time.
-_LOOK_S = 1.0
+LOOK_S = 1.0
 #: The number of looks after which a callback is named, and after which it may be interrupted.
 _NAMED_AFTER, _INTERRUPTED_AFTER = 10, 2
 #: The number of looks after which a callback ends the run that has used no more CPU time between
@@ -157,7 +157,7 @@ class TurnWatch:
     def _run(self) -> None:
         turns = looks = idle_looks = 0
         cpu_s = 0.0
-        while not COMPUTER.wait(self._end, _LOOK_S):
+        while not COMPUTER.wait(self._end, LOOK_S):
             looks = looks + 1 if turns == self._clock.turns else 0
             turns = self._clock.turns
             before_s, cpu_s = cpu_s, COMPUTER.cpu_s(self._clock.running_thread)
@@ -171,7 +171,7 @@ class TurnWatch:
                     self._warn(f"{callback.name} is interrupted; it is at {at}")
                     callback.interrupt()
                 else:
-                    lasts = f"{callback.name} has not returned for {looks * _LOOK_S:g} s"
+                    lasts = f"{callback.name} has not returned for {looks * LOOK_S:g} s"
                     self._warn(f"{lasts}, in which the time does not advance; it is at {at}")
 
     def _end_waiting(self) -> None:

@@ -147,7 +147,7 @@ def test_names_of_a_running_system_are_completed() -> None:
 def test_names(
     complete_names: Complete, typed: str, offered: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(completion, "_WITHIN_S", 60.0)
+    monkeypatch.setattr(completion, "WITHIN_S", 60.0)
     monkeypatch.setattr(local_queries, "RESPONSE_S", 60.0)
     assert complete_names(typed) == offered
 

@@ -81,12 +81,12 @@ def test_texts_that_are_not_ascii_are_shown_as_they_are() -> None:
 
 def test_a_hostile_drift_has_the_usual_lines(capsys: pytest.CaptureFixture[str]) -> None:
     drift = Drift(DriftKind.EXTRA_NODE, HOSTILE, hint=HOSTILE)
-    write(diff._event("drift", drift, json=False))
+    write(diff.event_text("drift", drift, json=False))
     assert len(capsys.readouterr().out.splitlines()) == 2
 
 
 def test_a_hostile_check_has_the_usual_lines() -> None:
-    assert len(doctor._text(warning("graph", HOSTILE, HOSTILE)).split("\n")) == 2
+    assert len(doctor.result_text(warning("graph", HOSTILE, HOSTILE)).split("\n")) == 2
 
 
 def test_a_hostile_topic_has_the_usual_lines() -> None:
@@ -98,7 +98,10 @@ def test_a_hostile_system_has_one_title() -> None:
     report: Any = SimpleNamespace(
         activity="up", message=HOSTILE, host=HOSTILE, pid="1", nodes=(), processes={}
     )
-    for text in (ps._system(HOSTILE, None), ps._system("/robot", report).partition("\nnode ")[0]):
+    for text in (
+        ps.system_text(HOSTILE, None),
+        ps.system_text("/robot", report).partition("\nnode ")[0],
+    ):
         assert is_safe(text)
         assert "\n" not in text
 

@@ -73,7 +73,7 @@ def test_the_graph_is_recorded(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("publishing")
 def test_the_number_of_topics_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("composer.bags.graph_recording._MAX_TOPICS", 1)
+    monkeypatch.setattr("composer.bags.graph_recording.MAX_TOPICS", 1)
     warnings: list[str] = []
     writer = BagWriter(tmp_path / "bag")
     with Session() as session, Recorder(writer, COMPUTER) as recorder:

@@ -329,7 +329,7 @@ class _StalledDisk(_FullDisk):
 
 def test_small_messages_that_wait_for_a_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Python needs far more memory for them than for their bytes."""
-    monkeypatch.setattr("composer.bags.recorder._LARGEST_PENDING_BYTES", 1_000_000)
+    monkeypatch.setattr("composer.bags.recorder.LARGEST_PENDING_BYTES", 1_000_000)
     sink = _StalledDisk()
     recorder = Recorder(sink, COMPUTER)
     source = recorder.source(BagTopic("/empty", "std_msgs/msg/Empty"))

@@ -29,7 +29,7 @@ def apart_from_other_tests(
     """Use ROS domains that no other test uses."""
     with ExitStack() as domains:
         ids = (domains.enter_context(in_a_domain()) for _ in itertools.count())
-        monkeypatch.setattr(processes, "_domain_ids", ids)
+        monkeypatch.setattr(processes, "domain_ids", ids)
         yield
 
 

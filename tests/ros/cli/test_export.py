@@ -88,4 +88,4 @@ def test_the_policy_allows_every_endpoint_and_no_other(pipeline: Running) -> Non
 
 
 def test_the_topics_of_the_self_test_are_those_of_the_policy() -> None:
-    assert f"/{ignore_local_publications._TEST_NODE}/*" == SELF_TEST_TOPICS
+    assert f"/{ignore_local_publications.TEST_NODE}/*" == SELF_TEST_TOPICS

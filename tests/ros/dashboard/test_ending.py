@@ -11,13 +11,13 @@ import uvicorn
 from uvicorn.server import ServerState
 from websockets.asyncio.client import connect
 
-from composer.dashboard.web.server import _WebSocketProtocol
+from composer.dashboard.web.server import WebSocketProtocol
 from tests.ros.dashboard.test_foxglove_limits import raw
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import PATIENCE_S, Dashboard
 
 
-class EndsMeanwhile(_WebSocketProtocol):
+class EndsMeanwhile(WebSocketProtocol):
     """Of a server that ends just when the other side has closed the connection."""
 
     def handle_close(self, event: Any) -> None:

@@ -97,7 +97,7 @@ def test_an_early_response_waits_until_its_request_is_registered(
     on: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """rclpy registers a request after sending it, in several steps."""
-    monkeypatch.setattr(actions, "_LAST_RETRY_AFTER_S", 60.0)
+    monkeypatch.setattr(actions, "LAST_RETRY_AFTER_S", 60.0)
     has_come = threading.Event()
     is_early = actions.ActionSource._is_early
 

@@ -254,7 +254,7 @@ def test_a_class_that_waits_busily_ends_the_run(tmp_path: Path, is_ros: str) -> 
 def test_a_class_that_waits_for_a_lock_ends_the_run(
     tmp_path: Path, in_callback: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(virtual_time, "_LOOK_S", 0.01)
+    monkeypatch.setattr(virtual_time, "LOOK_S", 0.01)
     path = tmp_path / "locked.yaml"
     node = f'{{class: "{TIMED}:Locked", arguments: {{in_callback: {in_callback}}}}}'
     path.write_text(f"system: s\nnodes: {{locked: {node}}}\n")

@@ -32,7 +32,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Those that run here are awaited for longer.
-    monkeypatch.setattr("composer.runtime.supervision.start_and_end._REPORTS_WITHIN_S", 0.0)
+    monkeypatch.setattr("composer.runtime.supervision.start_and_end.STARTED_REPORT_WITHIN_S", 0.0)
     path = tmp_path / "robot.yaml"
     # With this backoff, the process returns before the coordinator starts one in its place.
     text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
@@ -76,7 +76,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             assert system.node("camera").activations == 2
             # Refused, because of one on another computer: the nodes belong to that.
             older = Instance("elsewhere", 4321, 3600.0)
-            system.host._on_older_instance("/lab/robot", older)
+            system.host.on_older_instance("/lab/robot", older)
             assert "already runs" in system.end().reason
             found.clear()
             wait_until(lambda: len(found) > 10, "messages of nodes that are still active")

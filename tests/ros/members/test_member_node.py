@@ -91,7 +91,7 @@ def restart_of_failed_node(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[tuple[Bench, MemberNode, Process, Future[Any]]]:
     """Restart a failed node whose reports are late from the beginning."""
-    monkeypatch.setattr(member_node, "_REPORTED_WITHIN_S", 0.0)
+    monkeypatch.setattr(member_node, "REPORTED_WITHIN_S", 0.0)
     with bench(ExecutorKind.EVENTS) as on:
         process = Process()
         node = failed_node(on, process, folder, Listener())

@@ -89,7 +89,7 @@ def test_requests_whose_responses_are_lost_do_not_keep_others_from_being_sent() 
     with bench(ExecutorKind.EVENTS) as on:
         process = Process(on)
         requests = client(on)
-        for number in range(member_requests._MAX_REQUESTS):
+        for number in range(member_requests.MAX_REQUESTS):
             step = f"/node{number}"
             result = on.loop.run(partial(requests.request, step, "activate"))
             wait_until(lambda step=step: f"activate {step}" in process.steps, step)
@@ -146,7 +146,7 @@ def test_steps_whose_responses_are_lost_are_requested_again() -> None:
 def test_a_process_whose_service_is_not_discovered_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(member_requests, "_READY_WITHIN_S", 0.0)
+    monkeypatch.setattr(member_requests, "READY_WITHIN_S", 0.0)
     with bench(ExecutorKind.EVENTS) as on:
         problems = list[str]()
         requests = requests_of(on, problems.append)
@@ -180,7 +180,7 @@ def test_an_error_of_discovery_does_not_keep_requests_from_being_sent(
 def test_a_process_that_is_not_meant_neither_follows_nor_answers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(member_requests, "_DISCOVERED_WITHIN_S", 0.0)
+    monkeypatch.setattr(member_requests, "DISCOVERED_WITHIN_S", 0.0)
     asked: list[str] = []
 
     def nothing(*_: object) -> Any:

@@ -190,7 +190,7 @@ def test_the_layout_of_requests_is_known(peer: Peer) -> None:
     request = SetParameters.Request(parameters=changes)
     checked: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(limited_requests, "_over", lambda *given: checked.append(given[0]))
+        patch.setattr(limited_requests, "excess_of", lambda *given: checked.append(given[0]))
         peer.call(SetParameters, "/laid_out", request)
     assert checked == [2, 3 + 5 + 7 + 11 + 13 + 17 + 19]
     assert requests[0] == request

@@ -144,7 +144,7 @@ def test_a_refused_system_leaves_an_external_node_as_it_is(tmp_path: Path, peer:
             with running(text, tmp_path) as system:
                 assert peer.call(GetState, state).current_state.label == "active"
                 older = Instance("elsewhere", 4321, 3600.0)
-                system.host._on_older_instance("/robot", older)
+                system.host.on_older_instance("/robot", older)
                 assert "already runs" in system.end().reason
                 assert peer.call(GetState, state).current_state.label == "active"
         finally:

@@ -17,7 +17,7 @@ LIMIT_BYTES = 1_000_000
 @pytest.mark.parametrize("size", [1, 10_000])
 def test_a_clock_that_is_set_back(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     """No message is old then, and small messages take more memory than their bytes."""
-    monkeypatch.setattr("composer.bags.ring._LARGEST_BYTES", LIMIT_BYTES)
+    monkeypatch.setattr("composer.bags.ring.LARGEST_BYTES", LIMIT_BYTES)
     ring = Ring(seconds=10.0)
     ring.add_topic(BagTopic("/chat", "std_msgs/msg/String"))
     tracemalloc.start()

@@ -37,8 +37,8 @@ def test_resvg_draws_it_twice_as_large_as_it_is_laid_out() -> None:
 
 def test_a_large_picture_does_not_take_all_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("resvg_py")
-    assert output._MAX_PIXELS <= 40_000_000
-    monkeypatch.setattr(output, "_MAX_PIXELS", 400_000)  # quick to draw
+    assert output.MAX_PIXELS <= 40_000_000
+    monkeypatch.setattr(output, "MAX_PIXELS", 400_000)  # quick to draw
     width, height = size(drawn(fleet_graph(100, View.DEPLOYMENT)))
     assert 350_000 < width * height < 450_000
 

@@ -21,7 +21,7 @@ if yaml.__with_libyaml__:
 def parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of the parsers that PyYAML may have in turn."""
     events = importlib.import_module("composer.language.document.builder")
-    monkeypatch.setattr(events, "_LOADER", request.param)
+    monkeypatch.setattr(events, "LOADER", request.param)
 
 
 def diagnostics_in(text: str) -> list[Diagnostic]:

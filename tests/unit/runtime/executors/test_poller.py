@@ -20,8 +20,8 @@ _LONG_S = 30.0
 @pytest.fixture(params=["with epoll_pwait2", "without"])
 def poller(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Poller:
     if request.param == "without":  # as on Linux before 5.11
-        monkeypatch.setattr(module, "_HAS_PWAIT2", False)
-    elif not module._HAS_PWAIT2:
+        monkeypatch.setattr(module, "HAS_PWAIT2", False)
+    elif not module.HAS_PWAIT2:
         pytest.skip("this Linux has no epoll_pwait2")
     return Poller(COMPUTER)
 

@@ -71,7 +71,7 @@ def test_looking_for_a_lock_that_was_never_held_creates_no_file(folder: Path) ->
 def test_a_login_session_and_a_service_share_the_folder(
     session: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(instance_lock, "_COMMON", str(folder.parent))
+    monkeypatch.setattr(instance_lock, "COMMON_FOLDER", str(folder.parent))
     monkeypatch.setenv("XDG_RUNTIME_DIR", session)
     with hold_instance_lock(NAME):
         monkeypatch.delenv("XDG_RUNTIME_DIR")

@@ -126,7 +126,7 @@ def test_the_view_of_another_discovery_range_is_not_used(
     serve(lambda: VIEW)
     # Server and client share an environment here: each reads it once, the server first.
     ranges = iter(["LOCALHOST", "SUBNET"])
-    monkeypatch.setattr(query_socket, "_environment", lambda: next(ranges))
+    monkeypatch.setattr(query_socket, "discovery_environment", lambda: next(ranges))
     assert read_graph("/robot", LIMIT_S) is None
 
 

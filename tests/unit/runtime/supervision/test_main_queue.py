@@ -41,7 +41,7 @@ def test_a_wait_ends_in_time() -> None:
 def test_a_stop_ends_stoppable_waits_and_a_second_one_shortens_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "_SAME_REQUEST_S", 60.0)
+    monkeypatch.setattr(module, "SAME_REQUEST_S", 60.0)
     main_queue: MainQueue[str] = MainQueue(COMPUTER)
     main_queue.put("never handled")
     main_queue.request_stop("SIGINT")
@@ -50,7 +50,7 @@ def test_a_stop_ends_stoppable_waits_and_a_second_one_shortens_the_others(
     assert not main_queue.wait(lambda: False, time.monotonic() + 60.0, stoppable=True)
     main_queue.request_stop("SIGINT")  # the same signal, forwarded
     assert (main_queue.stop_reason, main_queue.urgent) == ("SIGINT", False)
-    monkeypatch.setattr(module, "_SAME_REQUEST_S", 0.1)
+    monkeypatch.setattr(module, "SAME_REQUEST_S", 0.1)
     until_s = time.monotonic() + 20.0
     while not main_queue.urgent and time.monotonic() < until_s:
         main_queue.request_stop("SIGTERM")
