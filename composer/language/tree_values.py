@@ -91,10 +91,10 @@ def number(tree: Tree | None) -> Located[float] | None:
 def choice(tree: Tree | None, kind: type[E]) -> Located[E] | None:
     """Return the member of an enumeration, or None."""
     written = text(tree)
-    known = {item.value: item for item in kind}
-    if written is None or written.value not in known:
+    try:
+        return None if written is None else written.map(kind)
+    except ValueError:
         return None
-    return written.map(known.__getitem__)
 
 
 def value_or(found: Located[T] | None, default: D) -> T | D:

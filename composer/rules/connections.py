@@ -269,7 +269,8 @@ def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
 
 def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that are declared as required."""
-    for kind in PortKind:
+    ports = (port for node in context.system.nodes for port in node.ports)
+    for kind in sorted({port.kind for port in ports if port.required}):
         for endpoint in unconnected_ports(context, kind):
             if endpoint.port.required:
                 yield Diagnostic(

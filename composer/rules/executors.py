@@ -255,14 +255,15 @@ def _threads(executor: Executor) -> int:
 
 
 def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
-    callbacks: list[tuple[Timer | Port, Cause]] = []
-    callbacks += [(timer, Cause(timer=timer)) for timer in node.timers]
-    callbacks += [(port, Cause(port=port)) for port in node.ports]
-    for callback, cause in callbacks:
+    callbacks: tuple[Timer | Port, ...] = (*node.timers, *node.ports)
+    for callback in callbacks:
         budget_ms = callback.budget_ms
-        rate_hz = known.callback_hz(node, cause) if budget_ms is not None else None
-        if budget_ms is not None and rate_hz is not None:
-            period = callback.period.value if isinstance(callback, Timer) else None
+        if budget_ms is None:
+            continue
+        timer, port = (callback, None) if isinstance(callback, Timer) else (None, callback)
+        rate_hz = known.callback_hz(node, Cause(timer, port))
+        if rate_hz is not None:
+            period = timer.period.value if timer is not None else None
             name = f"{node.name}.{callback.name}"
             used = used_parameters(period)
             yield CallbackLoad(name, rate_hz, budget_ms, callback.reentrant, used)
