@@ -154,3 +154,13 @@ def test_what_most_ports_lack_is_reported_a_limited_number_of_times(
     assert len(found) == reported
     assert [item.primary.line for item in notes] == ([5] if reported < 4 else [])
     assert loading.is_runnable
+
+
+def test_copies_are_at_one_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("composer.rules.analysis.context.MAX_FINDINGS", 2)
+    node = "a${i}: {for_each: {i: 4}, publishers: {p: {type: std_msgs/msg/String, topic: 'a${i}'}}}"
+    loading = load(write(tmp_path, f"system: robot\nnodes:\n  {node}\n"))
+    assert {item.rule.name for item in loading.diagnostics} == {
+        "qos-implicit",
+        "publisher-without-subscription",
+    }

@@ -28,8 +28,8 @@ MAX_ENTRIES = 5_000
 #: Errors of one stage of checking a file.
 MAX_ERRORS = 500
 
-#: Diagnostics of a check of each port that reports no errors.
-MAX_FINDINGS = 5_000
+#: Places at which a check of every port finds something that is no error.
+MAX_FINDINGS = 2_000
 
 #: Copies made by all ``for_each`` of one file.
 MAX_COPIES = 5_000

@@ -6,7 +6,6 @@ import ast
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field, replace
 from functools import wraps
-from itertools import islice
 from typing import Any, TypeAlias, TypeVar
 
 from composer.base.diagnostics import Diagnostic, Label, Rule, Severity
@@ -99,21 +98,21 @@ Check: TypeAlias = Callable[[Context], Iterator[Diagnostic]]
 
 
 def limited(check: Check) -> Check:
-    """Limit the diagnostics of a check; only for one that reports no errors.
+    """Limit the places at which a check finds something; only for one that reports no errors.
 
-    Beyond the limit, the check ends with an info that says so.
+    Beyond the limit, the check ends with an info that says so. Copies are at one place.
     """
 
     @wraps(check)
     def limited_check(context: Context) -> Iterator[Diagnostic]:
-        diagnostics = check(context)
-        yield from islice(diagnostics, MAX_FINDINGS)
-        for item in islice(diagnostics, 1):
-            message = (
-                f"more than {MAX_FINDINGS:,} diagnostics are like this one; the others are left out"
-            )
+        places = set()
+        for item in check(context):
             yield item
-            yield Diagnostic(replace(TOO_LARGE, severity=Severity.INFO), message, item.primary)
+            places.add(location(item.primary))
+            if len(places) > MAX_FINDINGS:
+                message = f"more than {MAX_FINDINGS:,} places have this; the others are left out"
+                yield Diagnostic(replace(TOO_LARGE, severity=Severity.INFO), message, item.primary)
+                return
 
     return limited_check
 
