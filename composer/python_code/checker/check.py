@@ -5,21 +5,21 @@ from __future__ import annotations
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
+from typing import TYPE_CHECKING
 
 from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.model import Node
-from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.copies import Copy, edited_copy
 from composer.python_code.checker.file_sets import FileSet, file_sets
-from composer.python_code.checker.findings import MISSING_RETURN, SYNTAX_KINDS, Reader
-from composer.python_code.checker.owners import Owners
-from composer.python_code.checker.pyrefly import Finding, Run, start
-from composer.python_code.checker.relevance import Relevance, changed_names
+from composer.python_code.checker.pyrefly import MISSING_RETURN, SYNTAX_KINDS, Finding, Run, start
 from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.problems import CheckerFailed, Family, Problem
+
+if TYPE_CHECKING:
+    from composer.python_code.checker.relevance import Relevance
 
 #: Findings in one file that are read, as each costs time. A real file has a few.
 MAX_FINDINGS = 500
@@ -60,6 +60,20 @@ class Check:
         findings = self._run.findings()
         yield from self._syntax_problems({x.path for x in findings if x.kind in SYNTAX_KINDS})
         places = self._places(findings)
+        if places:
+            yield from self._problems(places)
+
+    def _problems(
+        self, places: Mapping[str, list[tuple[Finding, Span]]]
+    ) -> Iterator[tuple[str, Problem]]:
+        # Most code has no findings, and these modules take 10 ms of each start.
+        from composer.python_code.checker.code_index import CodeIndex  # noqa: PLC0415
+        from composer.python_code.checker.owners import Owners  # noqa: PLC0415
+        from composer.python_code.checker.relevance import (  # noqa: PLC0415
+            Relevance,
+            changed_names,
+        )
+
         owners = Owners(self.files.behaviors, self._stubs)
         codes = {path: CodeIndex(self._copies[path].module) for path in places}
         attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
@@ -77,6 +91,8 @@ class Check:
         self, findings: Iterable[tuple[Finding, Span]], relevance: Relevance
     ) -> Iterator[Problem]:
         """Yield the problems of a file: one of each family in a line, and one of each message."""
+        from composer.python_code.checker.findings import Reader  # noqa: PLC0415 - slow
+
         seen: set[object] = set()
         wrong_imports: list[str] = []
         for finding, span in findings:

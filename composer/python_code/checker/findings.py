@@ -18,7 +18,7 @@ from composer.interfaces import Interfaces
 from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
 from composer.python_code.checker.owners import Owner, public_names
-from composer.python_code.checker.pyrefly import Finding
+from composer.python_code.checker.pyrefly import MISSING_RETURN, Finding
 from composer.python_code.checker.relevance import (
     ARGUMENT,
     NO_ATTRIBUTE,
@@ -37,8 +37,6 @@ from composer.python_code.trees import (
     span_of,
 )
 
-#: What the checker says about code that Python refuses to compile.
-SYNTAX_KINDS = frozenset({"invalid-syntax", "parse-error"})
 _FAMILIES = {
     "invalid-syntax": Family.SYNTAX,
     "parse-error": Family.SYNTAX,
@@ -59,7 +57,6 @@ _ASSIGNMENT = (
     r"`(?P<given>.+?)` is not assignable to (?:attribute `\w+` with type |declared return type )?"
     r"`(?P<expected>.+?)`"
 )
-MISSING_RETURN = "missing an explicit `return`"
 _CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.

@@ -42,6 +42,9 @@ _KINDS = (
     *("unbound-name", "unexpected-keyword", "unknown-name", "unsupported-operation"),
     "unused-coroutine",
 )
+#: What the checker says about code that Python refuses to compile.
+SYNTAX_KINDS = frozenset({"invalid-syntax", "parse-error"})
+MISSING_RETURN = "missing an explicit `return`"
 #: Kinds that are off by default and point to mistakes.
 _OFF_BY_DEFAULT = (
     *("implicit-bool", "incompatible-comparison", "invalid-format-spec"),
