@@ -28,7 +28,7 @@ MAX_ENTRIES = 5_000
 #: Errors of one stage of checking a file.
 MAX_ERRORS = 500
 
-#: Places at which a check of every port finds something that is no error.
+#: Places at which a check of every port finds something that is not an error.
 MAX_FINDINGS = 2_000
 
 #: Copies made by all ``for_each`` of one file.
