@@ -66,7 +66,7 @@ class MemberProcess:
             context.manager,
             context.loop,
             f"{self._name}/{NAME}/{REQUEST}",
-            on_report_key=lambda key: self._reports.on_key(key),  # noqa: PLW0108 - see below
+            on_report_key=lambda key: self._reports.on_key(key),  # noqa: PLW0108 - set below
             on_problem=self._lives.warn,
         )
         self._reports = MemberReports(
