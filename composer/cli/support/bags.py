@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import inf
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -85,11 +87,19 @@ def bag_errors() -> Iterator[None]:
     temporary files are deleted.
     """
     from composer.bags.bag import BagError, require
-    from composer.runtime.process.watchdog import STOP_SIGNALS
+    from composer.runtime.process.watchdog import SAME_REQUEST_S, STOP_SIGNALS
+
+    requested_s = -inf
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal requested_s
+        if time.monotonic() - requested_s > SAME_REQUEST_S:
+            requested_s = time.monotonic()
+            signal.default_int_handler(number, frame)
 
     signals = [item for item in STOP_SIGNALS if signal.getsignal(item) is signal.SIG_DFL]
     for number in signals:
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, interrupt)
     try:
         require("mcap")
         yield

@@ -25,6 +25,7 @@ from composer.client.hosts.remote_command import NO_PYTHON, NO_SETUP, NO_WORKSPA
 from composer.model import Host, LogLevel, Process
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.output import OutputLines, attribute_line, process_loggers
+from composer.runtime.process.watchdog import SAME_REQUEST_S
 
 _BEAT_S = 2.0
 _RETRY_S = 1.0
@@ -34,8 +35,6 @@ _SETTLED_S = 30.0
 _ENDS_WITHIN_S = 20.0
 #: After the second request to end everything.
 _ENDS_AT_ONCE_S = 1.0
-#: Tools that forward signals send a second one along with the terminal's; no user is that fast.
-_SAME_REQUEST_S = 0.1
 #: Exit codes after which a process is not started again: it cannot work.
 _USAGE, _CONFIG = 2, 78
 _FINAL = (_USAGE, _CONFIG, NO_WORKSPACE, NO_SETUP, NO_PYTHON)
@@ -91,7 +90,7 @@ class Deployment:
     def end(self) -> None:
         """End everything in order; after the second request, at once."""
         now_s = time.monotonic()
-        if now_s - self._requested_s > _SAME_REQUEST_S:
+        if now_s - self._requested_s > SAME_REQUEST_S:
             self._is_urgent.set()
         self._requested_s = min(now_s, self._requested_s)
         self._is_ending.set()

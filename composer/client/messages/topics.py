@@ -52,7 +52,7 @@ class Publication:
 
 
 #: A message has its time already, so it may wait: polling costs less than a wake-up for each.
-_POLL_PERIOD_S = 0.002
+_POLL_PERIOD_S = 0.01
 
 
 class TopicSubscription(SampledTopic):

@@ -26,7 +26,7 @@ from websockets.exceptions import InvalidState
 from composer.dashboard.access import Refusal
 from composer.dashboard.protocol.outbox import MAX_MESSAGE
 from composer.dashboard.web.app import AccessCheck, refusal_page, security_headers
-from composer.runtime.process.watchdog import STOP_SIGNALS
+from composer.runtime.process.watchdog import SAME_REQUEST_S, STOP_SIGNALS
 
 DEFAULT_PORT = 8800
 #: Ports that are tried if the default one is in use.
@@ -45,8 +45,6 @@ _CLOSED_WITHIN_S = 2.0
 #: At the end, for all connections together; then they are aborted.
 _ENDED_WITHIN_S = 0.5
 _END_S = 1
-#: Tools that forward signals send a second one along with the terminal's; no user is that fast.
-_SAME_REQUEST_S = 0.1
 _SIGNAL_EXIT = 128
 
 
@@ -140,7 +138,7 @@ class _Server(uvicorn.Server):
         self._on_ready()
         await ended.wait()
         self.should_exit = True
-        await asyncio.sleep(_SAME_REQUEST_S)
+        await asyncio.sleep(SAME_REQUEST_S)
         for number in STOP_SIGNALS:
             loop.remove_signal_handler(number)
             signal.signal(number, _end_at_once)

@@ -29,8 +29,9 @@ from contextlib import contextmanager, suppress
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 #: A second signal ends the process after this time.
 _URGENT_S = 1.0
-#: Tools that forward signals send a second one along with the terminal's.
-_SAME_REQUEST_S = 0.1
+#: Signals within this time are one request: tools that forward signals send one along with the
+#: terminal's, and Linux sends that of a parent's end once for each of its threads.
+SAME_REQUEST_S = 0.1
 _INTERVAL_S = 0.25
 _STACKS_WITHIN_S = 2.0
 _PACKET_BYTES = 65_536
@@ -103,11 +104,11 @@ def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:
         poll.poll()
         if not _unread(wakeup):
             # It was woken by something else. Until it reads that, poll returns at once.
-            time.sleep(_SAME_REQUEST_S / 2)
+            time.sleep(SAME_REQUEST_S / 2)
             continue
-        time.sleep(_SAME_REQUEST_S)
+        time.sleep(SAME_REQUEST_S)
         # While this process had no processor, a second request may have arrived.
-        is_late = _late_s() - late_s > _SAME_REQUEST_S / 2
+        is_late = _late_s() - late_s > SAME_REQUEST_S / 2
         number = _unhandled(wakeup, process, limit_s, 1 if is_late else len(_unread(wakeup)))
         if number is not None:
             _end(descriptor, signal.Signals(number).name)

@@ -15,6 +15,7 @@ from composer.model import System
 from composer.plan import DesiredState, Fault
 from composer.runtime.clock.clock import Clock
 from composer.runtime.process.signals import wakeup_for
+from composer.runtime.process.watchdog import SAME_REQUEST_S
 from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.status import Status
 
@@ -51,8 +52,6 @@ K = TypeVar("K")
 
 #: What remains of any time limit after a second stop request.
 _URGENT_S = 0.05
-#: Tools that forward signals send a second one along with the terminal's; no user is that fast.
-SAME_REQUEST_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
