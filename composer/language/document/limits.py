@@ -1,7 +1,7 @@
 """Limits for the size of files, and for the number of errors that are reported of one.
 
-They allow any file written by hand and generated systems of 5 000 nodes. Checking a file takes at
-most about three seconds for each megabyte, whatever it contains, and 200 MB.
+They allow any file written by hand and generated systems of 5 000 nodes. Checking a file of a
+megabyte takes at most about three seconds, whatever it contains, and 200 MB.
 """
 
 from __future__ import annotations
