@@ -164,9 +164,12 @@ def nearest(name: str, candidates: Iterable[str]) -> str | None:
 
 def nearest_full_name(name: str, known: Collection[str]) -> str | None:
     """Return the name in the ROS graph closest to ``name``, with its namespace or without."""
+    close = nearest(name, known)
+    if close is not None:
+        return close
     by_last_part = {found.rpartition("/")[2]: found for found in known}
     match = nearest(name.rpartition("/")[2], by_last_part)
-    return nearest(name, known) or (by_last_part[match] if match is not None else None)
+    return None if match is None else by_last_part[match]
 
 
 def suggestion(name: str, candidates: Iterable[str], *, limit: int = 8) -> str | None:

@@ -18,7 +18,7 @@ from composer.model import (
     StaticTransform,
     Timer,
 )
-from composer.model.qos import DURATIONS, PRESETS, History, QosProfile
+from composer.model.qos import DISCOVERED_POLICIES, DURATIONS, PRESETS, History, QosProfile
 from composer.python_code.lookup import find_behavior
 from composer.python_code.nodes import published_port
 from composer.python_code.syntax import Method
@@ -70,8 +70,9 @@ def qos_facts(profile: QosProfile) -> dict[str, Plain]:
 
 def discovered_qos_facts(profile: QosProfile) -> dict[str, Plain]:
     """Return the policies that discovery reports."""
-    unknown = ("history", "depth")
-    return {name: value for name, value in qos_facts(profile).items() if name not in unknown}
+    return {
+        name: value for name, value in qos_facts(profile).items() if name in DISCOVERED_POLICIES
+    }
 
 
 def _history(profile: QosProfile) -> str:

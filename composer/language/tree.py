@@ -72,10 +72,8 @@ class Mapping:
 
     def get(self, name: str) -> Tree | None:
         """Return the value under ``name``, or None."""
-        for entry in self.entries:
-            if entry.key.value == name:
-                return entry.value
-        return None
+        entry = self.entry(name)
+        return entry.value if entry is not None else None
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries)

@@ -69,6 +69,12 @@ class QosProfile:
         return None if self.history is History.KEEP_ALL else max(self.depth, 1)
 
 
+#: The policies that discovery reports for publishers and subscriptions: not the queue.
+DISCOVERED_POLICIES = tuple(
+    policy for policy in QosProfile.__annotations__ if policy not in {"history", "depth"}
+)
+
+
 #: The predefined profiles.
 #:
 #: ``sensor_data``, ``services_default`` and ``parameters`` are those of rmw/qos_profiles.h.

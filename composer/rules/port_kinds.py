@@ -6,14 +6,7 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, error
 from composer.base.fast_dataclass import dataclass
-from composer.model import (
-    Chain,
-    ChannelKind,
-    Connection,
-    Endpoint,
-    Port,
-    PortKind,
-)
+from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.expressions import SENDERS, sends
 from composer.rules.analysis.formatting import a, either

@@ -18,9 +18,7 @@ from composer.cli.support.completion import complete_rule
 from composer.cli.support.errors import FAILED, UsageError
 from composer.cli.support.name_values import complete_system_or_argument, split_arguments
 from composer.cli.support.options import examples
-from composer.cli.support.system_arguments import (
-    check_exists,
-)
+from composer.cli.support.system_arguments import check_exists
 from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
 if TYPE_CHECKING:

@@ -148,7 +148,10 @@ def path_exists(path: Path) -> bool:
 
 
 def check_exists(path: Path) -> None:
-    """Raise UsageError if there is no such path, with that of a system or a similar one."""
+    """Raise UsageError if there is no such path.
+
+    The hint is the path of the system of that name, or a similar path.
+    """
     from composer.base.source import shown_path
 
     if not path_exists(path):

@@ -74,7 +74,7 @@ class TopicSubscription(SampledTopic):
     def wait(self, deadline: Deadline) -> list[Sample]:
         """Return the messages that have arrived; wait for the first one until the deadline."""
         while not (samples := self.take(_MAX_TAKEN)) and not deadline.passed:
-            time.sleep(min(_POLL_PERIOD_S, deadline.left_s))
+            time.sleep(min(_POLL_PERIOD_S, deadline.left_s))  # no callback: messages are taken
         return samples
 
 

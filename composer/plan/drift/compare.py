@@ -19,7 +19,7 @@ from composer.model import (
     PrimaryState,
     System,
 )
-from composer.model.qos import QosProfile
+from composer.model.qos import DISCOVERED_POLICIES, QosProfile
 from composer.plan import bring_up
 from composer.plan.drift.drift import (
     MANAGER,
@@ -34,10 +34,6 @@ from composer.plan.drift.drift import (
 _NODES_HINT = "if its program creates them all, list their names under 'nodes' of the executable"
 #: States in which a node has its ports.
 _WITH_PORTS = ("inactive", "active")
-#: The policies that discovery reports for publishers and subscriptions; not history and depth.
-_DISCOVERED_POLICIES = tuple(
-    policy for policy in QosProfile.__annotations__ if policy not in {"history", "depth"}
-)
 #: Policies that apply to publishers only.
 _PUBLISHERS_ONLY = ("lifespan_ms",)
 
@@ -246,7 +242,7 @@ def _of_same_endpoint(
 def _differing(live: QosProfile, declared: QosProfile, kind: PortKind) -> list[str]:
     return [
         policy
-        for policy in _DISCOVERED_POLICIES
+        for policy in DISCOVERED_POLICIES
         if getattr(live, policy) != getattr(declared, policy)
         and not (policy in _PUBLISHERS_ONLY and kind is not PortKind.PUBLISHER)
     ]

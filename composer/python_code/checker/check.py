@@ -67,9 +67,9 @@ class Check:
         self, places: Mapping[str, list[tuple[Finding, Span]]]
     ) -> Iterator[tuple[str, Problem]]:
         # Most code has no findings, and these modules take 10 ms of each start.
-        from composer.python_code.checker.code_index import CodeIndex  # noqa: PLC0415
-        from composer.python_code.checker.owners import Owners  # noqa: PLC0415
-        from composer.python_code.checker.relevance import (  # noqa: PLC0415
+        from composer.python_code.checker.code_index import CodeIndex  # noqa: PLC0415 - slow
+        from composer.python_code.checker.owners import Owners  # noqa: PLC0415 - slow
+        from composer.python_code.checker.relevance import (  # noqa: PLC0415 - slow
             Relevance,
             changed_names,
         )

@@ -43,7 +43,7 @@ class Owner:
 
 
 class Owners:
-    """Looks up the classes that a check may name; ``stubs`` are those of its interfaces."""
+    """Looks up the classes that a check may name; ``stubs`` has its interfaces."""
 
     def __init__(self, behaviors: Mapping[str, Node], stubs: Mapping[str, str]) -> None:
         self._behaviors = behaviors

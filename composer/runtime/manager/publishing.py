@@ -180,7 +180,7 @@ class ReportTimes:
 
     DDS repeats what was lost for longer than the coordinating process waits: after the network has
     failed for a while, steps arrive that it has given up. The clocks of two computers may differ,
-    so the age of a request is that of the last report that its sender had seen.
+    so a request is as old as the last report that its sender had seen.
     """
 
     def __init__(self) -> None:

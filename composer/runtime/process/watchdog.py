@@ -30,7 +30,7 @@ STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 #: A second signal ends the process after this time.
 _URGENT_S = 1.0
 #: Signals within this time are one request: tools that forward signals send one along with the
-#: terminal's, and Linux sends that of a parent's end once for each of its threads.
+#: terminal's, and when a parent ends, Linux sends PR_SET_PDEATHSIG for each of its threads.
 SAME_REQUEST_S = 0.1
 _INTERVAL_S = 0.25
 _STACKS_WITHIN_S = 2.0
