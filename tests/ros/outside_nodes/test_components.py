@@ -173,7 +173,7 @@ def test_a_container_may_be_slow_with_more_components_than_its_services_queue(
     nodes = [slow.replace("  talker:", f"  {name}:") for name in names]
     with running(robot(*nodes), tmp_path) as system:
         assert not system.reported(NodeFailed)
-        assert loaded(peer) == [f"/robot/left/{name}" for name in names]
+        assert sorted(loaded(peer)) == [f"/robot/left/{name}" for name in names]
         assert system.stop().exit_code == 0
     unloaded = {f"unloads /robot/left/{name}" for name in names}
     wait_until(lambda: unloaded <= {*system.log()}, "the end of all before their container's")
