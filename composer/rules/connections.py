@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TypeAlias
 
-from composer.base.diagnostics import Diagnostic, Label, error, info, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, Severity, error, info, suggestion, warning
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
 from composer.language.document.limits import MAX_ERRORS
@@ -83,13 +84,14 @@ def _port_label(endpoint: PortOfNode) -> Label:
     return Label(endpoint.port.name.span, f"{endpoint.port.kind} '{endpoint.port.name}'")
 
 
-def external_hint(endpoint: PortOfNode) -> str:
-    """Return the hint for a port whose other end is outside the system."""
+def external_hint(endpoint: PortOfNode, undescribed: str | None) -> str:
+    """Return the hint for a port whose other end may be outside the system, or not declared."""
     port = endpoint.port
     key = "external: true"
     if port.name.span.file != endpoint.node.span.file:
         key = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
-    return f"set '{key}' if a node outside the system does"
+    declare = "" if undescribed is None else f"declare it in '{undescribed}' if that node does, or "
+    return f"{declare}set '{key}' if a node outside the system does"
 
 
 def _is_fully_known(context: Context) -> bool:
@@ -220,15 +222,31 @@ def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
             elif is_meant_by_another(context, endpoint):
                 continue
             place, labels = name_location(endpoint)
+            undescribed = context.once(_undescribed) if hint is None else None
+            does_not = not_done if undescribed is None else f"declares that it {not_done}"
             yield Diagnostic(
-                rule,
-                f"no node in this system {not_done} '{port.full_name}', "
+                rule if undescribed is None else replace(rule, severity=Severity.INFO),
+                f"no node in this system {does_not} '{port.full_name}', "
                 f"which '{port_name(endpoint)}' {done}",
                 place,
                 labels,
-                hint or external_hint(endpoint),
+                hint or external_hint(endpoint, undescribed),
                 relies_on=wiring(endpoint.node, port),
             )
+
+
+def _undescribed(context: Context) -> str | None:
+    """Return a node that may have any port, since YAML declares none; None if there is none.
+
+    Containers of components are left out: they have no ports to declare.
+    """
+    containers = {node.container.value for node in context.system.nodes if node.container}
+    names = (
+        node.name.value
+        for node in context.system.nodes
+        if node.gets_undeclared and not node.ports and node.name.value not in containers
+    )
+    return next(names, None)
 
 
 #: Names and patterns that ``recording`` lists and that are looked for; a file lists a few.
@@ -270,11 +288,14 @@ def check_recorded_name(context: Context) -> Iterator[Diagnostic]:
 def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that are declared as required."""
     ports = (port for node in context.system.nodes for port in node.ports)
+    rule = REQUIRED_PORT_UNCONNECTED
+    if context.once(_undescribed) is not None:
+        rule = replace(rule, severity=Severity.WARNING)
     for kind in sorted({port.kind for port in ports if port.required}):
         for endpoint in unconnected_ports(context, kind):
             if endpoint.port.required:
                 yield Diagnostic(
-                    REQUIRED_PORT_UNCONNECTED,
+                    rule,
                     f"port '{port_name(endpoint)}' must be connected, "
                     f"but '{endpoint.port.full_name}' has no {endpoint.port.kind.counterpart}",
                     endpoint.node.name.span,
