@@ -26,14 +26,18 @@ from composer.rules.analysis.class_ports import CREATORS, qos_profile
 
 T = TypeVar("T")
 
+_ACTION = ("node", "action_type", "action_name")
 #: The classes that create endpoints: their kind, and their arguments in order.
-_ACTIONS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
-    f"rclpy.action.{name}": (kind, ("node", "action_type", "action_name"))
-    for kind, names in (
-        (PortKind.ACTION_SERVER, ("ActionServer", "server.ActionServer")),
-        (PortKind.ACTION_CLIENT, ("ActionClient", "client.ActionClient")),
-    )
-    for name in names
+_CLASSES: dict[str, tuple[PortKind, tuple[str, ...]]] = {
+    "rclpy.action.ActionServer": (PortKind.ACTION_SERVER, _ACTION),
+    "rclpy.action.server.ActionServer": (PortKind.ACTION_SERVER, _ACTION),
+    "rclpy.action.ActionClient": (PortKind.ACTION_CLIENT, _ACTION),
+    "rclpy.action.client.ActionClient": (PortKind.ACTION_CLIENT, _ACTION),
+    # Its QoS profile can only be given by name.
+    "message_filters.Subscriber": (
+        PortKind.SUBSCRIPTION,
+        ("node", "msg_type", "topic", "callback", "qos_profile"),
+    ),
 }
 _TYPES = ("msg_type", "srv_type", "action_type")
 _NAMES = ("topic", "srv_name", "action_name")
@@ -133,8 +137,8 @@ class _ClassReader:
             full_name = scope.full_name(call.func)
             if name in CREATORS and full_name.startswith("self."):
                 self._add_port(scope, call, CREATORS[name], place)
-            elif full_name in _ACTIONS:
-                self._add_port(scope, call, _ACTIONS[full_name], place)
+            elif full_name in _CLASSES:
+                self._add_port(scope, call, _CLASSES[full_name], place)
             elif full_name == "self.declare_parameter":
                 self._add_parameter(scope, call, place)
             elif full_name == "self.declare_parameters":

@@ -15,6 +15,7 @@ from composer.model import PortKind
 
 DRIVER = """\
 import sys
+import message_filters
 import std_msgs.msg
 from rclpy.action import ActionClient
 from rclpy.duration import Duration
@@ -56,6 +57,7 @@ class Lidar(Base):
             std_msgs.msg.String, topic="/cmd", callback=self.on, qos_profile=qos
         )
         self.create_subscription(String, "map", self.on, QoSPresetProfiles.SENSOR_DATA.value)
+        message_filters.Subscriber(self, String, "depth", qos_profile=SENSOR)
         self.create_service(Trigger, "reset", self.on)
         self.create_client(Trigger, "stop")
         changed = QoSProfile(depth=3)
@@ -100,6 +102,7 @@ subscriptions:
     topic: /cmd
     qos: {depth: 3, reliability: best_effort, deadline_ms: 500.0}
   map: {type: std_msgs/msg/String, qos: sensor_data}
+  depth: {type: std_msgs/msg/String, qos: sensor_data}
 services:
   reset: {type: std_srvs/srv/Trigger}
 clients:
@@ -110,7 +113,7 @@ clients:
         "a publisher, because of f'out{i}'",
         "a publisher, because of self.kind",
     ]
-    assert "  # driver.py:34" in text.splitlines()
+    assert "  # driver.py:35" in text.splitlines()
     assert "driver" not in sys.modules
 
 
