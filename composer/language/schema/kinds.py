@@ -10,7 +10,7 @@ from composer.language import rules
 from composer.language.document.limits import MAX_ERRORS
 from composer.language.schema import kind_of, schema
 from composer.language.schema.hints import intended_key
-from composer.language.tree import Entry, Mapping, Scalar
+from composer.language.tree import Entry, Mapping, Scalar, Tree
 
 SYSTEM = "system"
 NODE = "node"
@@ -19,6 +19,8 @@ SCENARIO = "scenario"
 RULE = error("RC040", "wrong-kind-of-file")
 
 _WORDS = {SYSTEM: "a system", NODE: "a node type", SCENARIO: "a scenario"}
+_PARAMETERS = "it has parameters of nodes: list it in 'parameter_files' of a system"
+_LAUNCH = "it is a launch file: 'compose import launch' makes a system of it"
 
 
 def check_kind(
@@ -35,11 +37,18 @@ def check_kind(
         expected = " or ".join(_WORDS[name] for name in allowed)
         message = f"'{source.path}' is {_WORDS.get(kind, kind)}, not {expected}"
     possible = _WORDS if kind is None and len(allowed) > 1 else allowed
-    return Diagnostic(
-        RULE,
-        message,
-        entry.key.span if entry is not None else tree.span,
-        hint=", ".join(f"{_WORDS[name]} begins with '{name}: <name>'" for name in possible),
+    hint = ", ".join(f"{_WORDS[name]} begins with '{name}: <name>'" for name in possible)
+    if tree.entry("launch") is not None:
+        hint = _LAUNCH
+    elif any(_has_parameters(item.value) for item in tree):
+        hint = _PARAMETERS
+    return Diagnostic(RULE, message, entry.key.span if entry is not None else tree.span, hint=hint)
+
+
+def _has_parameters(tree: Tree) -> bool:
+    """Return whether this is a section of a parameter file, which may be in a namespace."""
+    return isinstance(tree, Mapping) and any(
+        entry.name.startswith("ros__parameters") or _has_parameters(entry.value) for entry in tree
     )
 
 
