@@ -222,7 +222,7 @@ def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
             elif is_meant_by_another(context, endpoint):
                 continue
             place, labels = name_location(endpoint)
-            undescribed = context.once(_undescribed) if hint is None else None
+            undescribed = context.once(undescribed_node) if hint is None else None
             does_not = not_done if undescribed is None else f"declares that it {not_done}"
             yield Diagnostic(
                 rule if undescribed is None else replace(rule, severity=Severity.INFO),
@@ -235,8 +235,8 @@ def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-def _undescribed(context: Context) -> str | None:
-    """Return a node that may have any port, since YAML declares none; None if there is none.
+def undescribed_node(context: Context) -> str | None:
+    """Return a node that may have any port, since YAML declares none of its ports, or None.
 
     Containers of components are left out: they have no ports to declare.
     """
@@ -289,7 +289,7 @@ def check_required_port_unconnected(context: Context) -> Iterator[Diagnostic]:
     """Check the ports that are declared as required."""
     ports = (port for node in context.system.nodes for port in node.ports)
     rule = REQUIRED_PORT_UNCONNECTED
-    if context.once(_undescribed) is not None:
+    if context.once(undescribed_node) is not None:
         rule = replace(rule, severity=Severity.WARNING)
     for kind in sorted({port.kind for port in ports if port.required}):
         for endpoint in unconnected_ports(context, kind):

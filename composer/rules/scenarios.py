@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
-from composer.base.diagnostics import Diagnostic, Label, suggestion
+from composer.base.diagnostics import Diagnostic, Label, nearest, suggestion
 from composer.base.source import Located, Span
 from composer.interfaces import Message
 from composer.interfaces.field_types.checker import FieldChecker
@@ -29,6 +29,7 @@ from composer.model.scenario import (
 from composer.python_code.nodes import handlers
 from composer.rules.analysis.context import Context, part_of_path
 from composer.rules.analysis.parameters import KNOWN_TYPES, range_problem, type_problem
+from composer.rules.connections import undescribed_node
 from composer.rules.expressions import INVALID_VALUE, UNKNOWN_FIELD, UNKNOWN_NAME
 from composer.rules.implementations import SETTING_WITHOUT_EFFECT
 from composer.rules.parameter_values import PARAMETER_VALUE
@@ -49,11 +50,11 @@ _KEYS: dict[str, frozenset[str]] = {
     ExpectationKind.LATENCY: frozenset({"at_most_ms"}),
     ExpectationKind.END_STATE: frozenset(),
 }
-#: What the system lacks if no node provides a channel that a step or an expectation names.
-_LACKS = {
-    ChannelKind.TOPIC: "no node publishes",
-    ChannelKind.SERVICE: "no node serves",
-    ChannelKind.ACTION: "no node serves",
+#: What no node does if none provides a channel that a step or an expectation names.
+_NOT_DONE = {
+    ChannelKind.TOPIC: "publishes",
+    ChannelKind.SERVICE: "serves",
+    ChannelKind.ACTION: "serves",
 }
 #: The step without which an event or a step has nothing to wait for.
 _NEEDED = {
@@ -202,9 +203,13 @@ def _unknown_channel(
     ]
     names = [channel.name for channel in usable]
     if name.value not in names:
-        lacks = "no node subscribes to" if is_sink else _LACKS[kind]
-        message = f"{lacks} '{name}'"
+        not_done = "subscribes to" if is_sink else _NOT_DONE[kind]
         hint = suggestion(name.value, names)
+        undescribed = context.once(undescribed_node)
+        if undescribed is not None and nearest(name.value, names) is None:
+            not_done = f"declares that it {not_done}"
+            hint = f"declare it in '{undescribed}' if that node does"
+        message = f"no node {not_done} '{name}'"
         yield Diagnostic(UNDECLARED_NAME, message, name.span, hint=hint)
 
 
