@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import TypeAlias
 
-from composer.base.diagnostics import Diagnostic, Label, Severity, error, info, suggestion, warning
+from composer.base.diagnostics import (
+    Diagnostic,
+    Label,
+    Severity,
+    error,
+    info,
+    nearest,
+    suggestion,
+    warning,
+)
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
 from composer.language.document.limits import MAX_ERRORS
@@ -233,6 +242,19 @@ def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
                 hint or external_hint(endpoint, undescribed),
                 relies_on=wiring(endpoint.node, port),
             )
+
+
+def no_node(
+    context: Context, does: str, name: str, names: Collection[str]
+) -> tuple[str, str | None]:
+    """Return the message that no node ``does`` something with ``name``, and a hint.
+
+    ``names`` are those with which a node does it.
+    """
+    node = context.once(undescribed_node)
+    if node is None or nearest(name, names) is not None:
+        return f"no node {does} '{name}'", suggestion(name, names)
+    return f"no node declares that it {does} '{name}'", f"declare it in '{node}' if that node does"
 
 
 def undescribed_node(context: Context) -> str | None:

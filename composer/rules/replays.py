@@ -22,6 +22,7 @@ from composer.model import Channel, ChannelKind, PortOfNode, channels
 from composer.model.names import matches_wildcard
 from composer.model.scenario import Replay
 from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.connections import no_node, undescribed_node
 from composer.rules.references import UNDECLARED_NAME, UNKNOWN_NODE
 from composer.rules.types import TYPE_MISMATCH
 
@@ -65,8 +66,8 @@ def check_replays(context: Context) -> Iterator[Diagnostic]:
             message = f"the bag lasts {recorded.duration_s:g} s"
             yield Diagnostic(OUT_OF_RANGE, message, start_s.span)
         if not context.is_partial:
-            problems = list(_listed(replay, recorded, topics))
-            yield from problems or _played(name, replay, recorded, topics)
+            problems = list(_listed(context, replay, recorded, topics))
+            yield from problems or _played(context, name, replay, recorded, topics)
 
 
 def _topics(context: Context, replaced: tuple[str, ...]) -> Mapping[str, Channel]:
@@ -109,7 +110,7 @@ def _unknown_nodes(context: Context, replay: Replay) -> Iterator[Diagnostic]:
 
 
 def _listed(
-    replay: Replay, recorded: Recorded, topics: Mapping[str, Channel]
+    context: Context, replay: Replay, recorded: Recorded, topics: Mapping[str, Channel]
 ) -> Iterator[Diagnostic]:
     """Check the topics that are listed."""
     for pattern in replay.topics:
@@ -121,8 +122,7 @@ def _listed(
             continue  # of these, what the system does not receive is not played
         elif pattern.value not in topics or not topics[pattern.value].sinks:
             received = [name for name, topic in topics.items() if topic.sinks]
-            message = f"no node subscribes to '{pattern}'"
-            hint = suggestion(pattern.value, received)
+            message, hint = no_node(context, "subscribes to", pattern.value, received)
             yield Diagnostic(UNDECLARED_NAME, message, pattern.span, hint=hint)
         elif publishers := topics[pattern.value].sources:
             yield _conflict(pattern, publishers)
@@ -138,7 +138,11 @@ def _conflict(topic: Located[str], publishers: tuple[PortOfNode, ...]) -> Diagno
 
 
 def _played(
-    name: Located[str], replay: Replay, recorded: Recorded, topics: Mapping[str, Channel]
+    context: Context,
+    name: Located[str],
+    replay: Replay,
+    recorded: Recorded,
+    topics: Mapping[str, Channel],
 ) -> Iterator[Diagnostic]:
     """Check that something is played, and its types."""
     received = {
@@ -149,9 +153,12 @@ def _played(
     played = {topic: item for topic, item in received.items() if not topics[topic].sources}
     if not played:
         nodes = sorted({item for topic in received for item in _names(topics[topic].sources)})
-        hint = f"'replace' nodes that publish topics of the bag: {', '.join(nodes)}"
+        hint: str | None = f"'replace' nodes that publish topics of the bag: {', '.join(nodes)}"
+        if not nodes:
+            undescribed = context.once(undescribed_node)
+            hint = None if undescribed is None else f"declare the subscriptions of '{undescribed}'"
         message = "the bag has no topic that the system receives and does not publish"
-        yield Diagnostic(UNDECLARED_NAME, message, name.span, hint=hint if nodes else None)
+        yield Diagnostic(UNDECLARED_NAME, message, name.span, hint=hint)
     for topic, type_name in sorted(played.items()):
         port = topics[topic].sinks[0].port
         if port.interface.value != type_name and not is_unresolved(port.interface.value):

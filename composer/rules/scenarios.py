@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
-from composer.base.diagnostics import Diagnostic, Label, nearest, suggestion
+from composer.base.diagnostics import Diagnostic, Label, suggestion
 from composer.base.source import Located, Span
 from composer.interfaces import Message
 from composer.interfaces.field_types.checker import FieldChecker
@@ -29,7 +29,7 @@ from composer.model.scenario import (
 from composer.python_code.nodes import handlers
 from composer.rules.analysis.context import Context, part_of_path
 from composer.rules.analysis.parameters import KNOWN_TYPES, range_problem, type_problem
-from composer.rules.connections import undescribed_node
+from composer.rules.connections import no_node
 from composer.rules.expressions import INVALID_VALUE, UNKNOWN_FIELD, UNKNOWN_NAME
 from composer.rules.implementations import SETTING_WITHOUT_EFFECT
 from composer.rules.parameter_values import PARAMETER_VALUE
@@ -204,12 +204,7 @@ def _unknown_channel(
     names = [channel.name for channel in usable]
     if name.value not in names:
         not_done = "subscribes to" if is_sink else _NOT_DONE[kind]
-        hint = suggestion(name.value, names)
-        undescribed = context.once(undescribed_node)
-        if undescribed is not None and nearest(name.value, names) is None:
-            not_done = f"declares that it {not_done}"
-            hint = f"declare it in '{undescribed}' if that node does"
-        message = f"no node {not_done} '{name}'"
+        message, hint = no_node(context, not_done, name.value, names)
         yield Diagnostic(UNDECLARED_NAME, message, name.span, hint=hint)
 
 
