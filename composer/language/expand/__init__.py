@@ -128,7 +128,7 @@ def _expand_sections(substitution: Substitution, tree: Mapping, left_out: list[L
         if is_system and entry.name in SECTIONS:
             section = expand_section(entry.name, entry.value, substitution, left_out)
             return Entry(entry.key, section)
-        return Entry(entry.key, substitution.add(entry.value, depth=1).tree)
+        return Entry(entry.key, substitution.add(entry.value, depth=1))
 
     return Mapping(tuple(expanded_entry(entry) for entry in tree), tree.span)
 

@@ -142,7 +142,7 @@ def expand_section(
         case Sequence():
             return _items(name, section, substitution, left_out)
         case _:
-            return substitution.add(section, 1).tree
+            return substitution.add(section, 1)
 
 
 def _named_entries(
@@ -162,7 +162,7 @@ def _named_entries(
             if failed is not None:
                 left_out.append(_left_out(section_name, str(key.value), failed))
                 continue
-            new = Entry(key, copy.add(without_conditions(body), _DEPTH).tree)
+            new = Entry(key, copy.add(without_conditions(body), _DEPTH))
             if new.name in made and has_reference(new.name):
                 continue  # a variable in the name is unknown
             if new.name in made:
@@ -188,9 +188,9 @@ def _items(
         for copy, body in copies:
             failed = failed_condition(body, copy)
             if failed is None:
-                made.append(copy.add(without_conditions(body), _DEPTH).tree)
+                made.append(copy.add(without_conditions(body), _DEPTH))
             elif section_name == "include":
-                include = copy.add(without_conditions(body), _DEPTH).tree
+                include = copy.add(without_conditions(body), _DEPTH)
                 left_out.append(replace(_left_out(section_name, "", failed), include=include))
     return Sequence(tuple(made), section.span)
 
@@ -220,7 +220,7 @@ def _each_copy(tree: Tree, substitution: Substitution) -> Iterator[tuple[Substit
     if for_each is None or not isinstance(tree, Mapping):
         yield substitution, tree
         return
-    loops = substitution.add(for_each.value, _DEPTH).tree
+    loops = substitution.add(for_each.value, _DEPTH)
     values = _values(loops)
     if values is None:
         # The schema reports the error. The names may have any value.

@@ -11,7 +11,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.graphs import cycles, strong_groups
 from composer.language.expand.arguments import Declared, read_declarations, section_name
 from composer.language.schema import kind_of
-from composer.language.tree import Mapping, Scalar, Sequence, Tree
+from composer.language.tree import Mapping, Scalar, Sequence, Tree, count_values
 
 #: Maximum number of comparisons for hints in one file, to limit the time.
 _MAX_COMPARISONS = 20_000
@@ -103,23 +103,17 @@ def read_scope(tree: Mapping) -> Scope:
 
 def measure(tree: Tree) -> Sized:
     """Return an expanded tree with its size."""
+    return Sized(tree, count_values(tree), _height(tree))
+
+
+def _height(tree: Tree) -> int:
     match tree:
         case Scalar():
-            return Sized(tree, 1, 0)
-        case Sequence():
-            return sized(tree, [measure(item) for item in tree.items])
-        case Mapping():
-            return sized(tree, [measure(entry.value) for entry in tree])
-
-
-def sized(tree: Sequence | Mapping, parts: list[Sized]) -> Sized:
-    """Return a map or list of ``parts`` with its size; keys count as values."""
-    values = 1 + (len(parts) if isinstance(tree, Mapping) else 0)
-    height = 0
-    for part in parts:  # called very often: generators would take twice as long
-        values += part.values
-        height = max(height, part.height)
-    return Sized(tree, values, 1 + height)
+            return 0
+        case Sequence(items=items):
+            return 1 + max(map(_height, items), default=0)
+        case Mapping(entries=entries):
+            return 1 + max((_height(entry.value) for entry in entries), default=0)
 
 
 def dependency_order(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import field
+from operator import is_
 
 from composer.base.diagnostics import Diagnostic, Label, Rule, shown
 from composer.base.fast_dataclass import dataclass
@@ -18,7 +19,7 @@ from composer.language.document.limits import (
     LimitedDiagnostics,
     Stopped,
 )
-from composer.language.expand.scope import Scope, Sized, sized
+from composer.language.expand.scope import Scope, Sized
 from composer.language.rules import DUPLICATE_KEY, TOO_LARGE
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
 
@@ -82,6 +83,7 @@ class Growth:
     """The size of an expanded file."""
 
     values: int = 0
+    height: int = 0  # the depth of maps and lists
     characters: int = 0
     copies: int = 0
 
@@ -99,13 +101,14 @@ class Substitution:
         """Return a substitution for another scope that shares the counts."""
         return Substitution(scope, self.diagnostics, self.growth, self.unknown)
 
-    def evaluate(self, tree: Tree, depth: int = 0) -> Sized:
-        """Return ``tree``, nested in ``depth`` maps and lists, with its variables replaced.
+    def evaluate(self, tree: Tree) -> Sized:
+        """Return the value of a name with its variables replaced.
 
         Values keep the location where they were written. Raises Stopped.
         """
-        self.growth.values = 0
-        return self.add(tree, depth)
+        self.growth.values = self.growth.height = 0
+        made = self.add(tree, 0)
+        return Sized(made, self.growth.values, self.growth.height)
 
     def grow(self, values: int, tree: Tree) -> None:
         """Count values that are inserted at ``tree``. Raises Stopped."""
@@ -121,39 +124,38 @@ class Substitution:
             message = f"with this, the file makes more than {MAX_COPIES:,} copies"
             raise self._too_large(tree, message, "use fewer values")
 
-    def add(self, tree: Tree, depth: int) -> Sized:
-        """Return ``tree`` with its variables replaced, adding to the counts."""
+    def add(self, tree: Tree, depth: int) -> Tree:
+        """Return ``tree``, nested in ``depth`` maps and lists, with its variables replaced.
+
+        Adds to the counts. A tree without variables is returned as it is. Raises Stopped.
+        """
         match tree:
             case Scalar():
                 return self._scalar(tree, depth)
-            case Sequence():
-                return self._sequence(tree, depth)
+            case Sequence(items=items):
+                self.grow(1, tree)
+                self.growth.height = max(self.growth.height, depth + 1)
+                made = tuple([self.add(item, depth + 1) for item in items])
+                return tree if all(map(is_, made, items)) else Sequence(made, tree.span)
             case Mapping():
                 return self._mapping(tree, depth)
 
-    def _sequence(self, tree: Sequence, depth: int) -> Sized:
-        self.grow(1, tree)
-        parts = [self.add(item, depth + 1) for item in tree.items]
-        if any(part.tree is not item for part, item in zip(parts, tree.items, strict=True)):
-            tree = Sequence(tuple(part.tree for part in parts), tree.span)
-        return sized(tree, parts)
-
-    def _mapping(self, tree: Mapping, depth: int) -> Sized:
+    def _mapping(self, tree: Mapping, depth: int) -> Mapping:
         self.grow(1 + len(tree.entries), tree)
-        parts = [self.add(entry.value, depth + 1) for entry in tree]
-        keys = [self.key(entry.key) for entry in tree]
-        made = list(zip(keys, parts, tree.entries, strict=True))
-        if any(key is not entry.key or part.tree is not entry.value for key, part, entry in made):
-            self._check_keys(tree, keys)
-            entries = tuple(Entry(key, part.tree) for key, part, _ in made)
-            tree = Mapping(entries, tree.span)
-        return sized(tree, parts)
+        self.growth.height = max(self.growth.height, depth + 1)
+        values = [self.add(entry.value, depth + 1) for entry in tree.entries]
+        keys = [self.key(entry.key) for entry in tree.entries]
+        made = list(zip(keys, values, tree.entries, strict=True))
+        if all([key is entry.key and value is entry.value for key, value, entry in made]):
+            return tree
+        self._check_keys(tree, keys)
+        return Mapping(tuple(Entry(key, value) for key, value, _ in made), tree.span)
 
     def key(self, key: Scalar) -> Scalar:
         """Return a key with its variables replaced, at its location. Raises Stopped."""
         if not isinstance(key.value, str) or not has_reference(key.value):
             return key
-        name = self.add(key, _KEY_DEPTH).tree
+        name = self.add(key, _KEY_DEPTH)
         if not isinstance(name, Scalar):
             message = f"'{shown(key.value)}' is {describe(name)}, which cannot be a name"
             self.diagnostics.append(Diagnostic(rules.MALFORMED_VARIABLE, message, key.span))
@@ -171,31 +173,32 @@ class Substitution:
                 label = Label(earlier.span, "the other one")
                 self.diagnostics.append(Diagnostic(DUPLICATE_KEY, message, key.span, (label,)))
 
-    def _scalar(self, scalar: Scalar, depth: int) -> Sized:
+    def _scalar(self, scalar: Scalar, depth: int) -> Tree:
         if not isinstance(scalar.value, str) or not has_reference(scalar.value):
             self.grow(1, scalar)
-            return Sized(scalar, 1, 0)
+            return scalar
         match pieces(scalar.value):
             case [Reference() as reference]:
                 return self._whole(reference, scalar, depth)
             case parts:
                 self.grow(1, scalar)
                 text = "".join(self._part(part, scalar) for part in parts)
-                return Sized(Scalar(text, scalar.span, verbatim=False), 1, 0)
+                return Scalar(text, scalar.span, verbatim=False)
 
-    def _whole(self, reference: Reference, scalar: Scalar, depth: int) -> Sized:
+    def _whole(self, reference: Reference, scalar: Scalar, depth: int) -> Tree:
         """Return the value of a scalar that is a single reference."""
         found = self._find(reference, scalar)
         if found is None:
             self.grow(1, scalar)
-            return Sized(scalar, 1, 0)
+            return scalar
         self.grow(found.values, scalar)
+        self.growth.height = max(self.growth.height, depth + found.height)
         if depth + found.height > MAX_DEPTH:
             raise self._too_large(
                 scalar,
                 f"with its variables expanded, this is nested more than {MAX_DEPTH} levels deep",
             )
-        return found
+        return found.tree
 
     def _part(self, part: str | Reference, scalar: Scalar) -> str:
         """Return the text of a part of a scalar."""
