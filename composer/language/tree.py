@@ -72,8 +72,10 @@ class Mapping:
 
     def get(self, name: str) -> Tree | None:
         """Return the value under ``name``, or None."""
-        entry = self.entry(name)
-        return entry.value if entry is not None else None
+        for entry in self.entries:
+            if entry.key.value == name:
+                return entry.value
+        return None
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries)

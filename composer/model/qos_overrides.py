@@ -7,10 +7,9 @@ those of ``rclpy.qos_overriding_options``; durations are in nanoseconds.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located
 from composer.model.ports import Parameter, ParameterType, Port, PortKind, Qos
 from composer.model.qos import DURATIONS, WORDS

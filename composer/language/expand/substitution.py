@@ -145,11 +145,16 @@ class Substitution:
         self.growth.height = max(self.growth.height, depth + 1)
         values = [self.add(entry.value, depth + 1) for entry in tree.entries]
         keys = [self.key(entry.key) for entry in tree.entries]
-        made = list(zip(keys, values, tree.entries, strict=True))
-        if all([key is entry.key and value is entry.value for key, value, entry in made]):
+        made = tuple(
+            [
+                entry if key is entry.key and value is entry.value else Entry(key, value)
+                for key, value, entry in zip(keys, values, tree.entries, strict=True)
+            ]
+        )
+        if all(map(is_, made, tree.entries)):
             return tree
         self._check_keys(tree, keys)
-        return Mapping(tuple(Entry(key, value) for key, value, _ in made), tree.span)
+        return Mapping(made, tree.span)
 
     def key(self, key: Scalar) -> Scalar:
         """Return a key with its variables replaced, at its location. Raises Stopped."""

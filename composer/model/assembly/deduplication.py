@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from collections.abc import Mapping as Map
-from dataclasses import replace
 
 from composer.base.diagnostics import Diagnostic, Label
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located, Span
 from composer.model import Node
 

@@ -213,9 +213,10 @@ def _missing(tree: Mapping, given: dict[str, Entry], span: Span) -> Iterator[Dia
 
 def _without_emptied(found: list[Diagnostic], written: Mapping) -> Iterator[Diagnostic]:
     """Yield diagnostics, except of sections that are empty because of conditions."""
-    emptied = {str(entry.key.span) for entry in written if plain(entry.value)}
+    sections = {str(entry.key.span): entry.value for entry in written}
     for item in found:
-        if item.rule is not EMPTY_COLLECTION or str(item.primary) not in emptied:
+        section = sections.get(str(item.primary)) if item.rule is EMPTY_COLLECTION else None
+        if section is None or not plain(section):
             yield item
 
 

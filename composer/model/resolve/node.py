@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from collections.abc import Mapping as Map
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Sequence, Tree
 from composer.language.tree_values import (
@@ -122,8 +121,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
     transforms = place_transforms(declared.transforms, names, remappings)
     # The process has one subscription on /tf, which is not a node's.
     transform_ports = () if transforms is None else transforms.publishers
-    overridable = frozenset(override_names((*ports, *transform_ports)))
-    given = _given_values(entry.name, tree, declared, context, overridable)
+    given = _given_values(entry.name, tree, declared, context, (*ports, *transform_ports))
     parameters = node_parameters(
         declared.parameters,
         given,
@@ -192,19 +190,23 @@ def _given_values(
     tree: Mapping,
     declared: Declaration,
     context: SystemContext,
-    overridable: frozenset[str],
+    ports: tuple[Port, ...],
 ) -> GivenValues:
-    """Return the values for the parameters of the node with the key ``name``."""
+    """Return the values for the parameters of the node with the key ``name`` and these ports."""
     is_inline = tree.entry("type") is None
     declares_clock = any(item.name.value == USE_SIM_TIME for item in declared.parameters)
     clock = () if is_inline and declares_clock else context.use_sim_time
+    files = context.parameter_files
+    own = {} if is_inline else {item.name: item for item in entries(tree.get("parameters"))}
+    command_line = context.overrides.by_node.get(name, {})
+    may_override = declared.parameters or own or command_line or files.sections
     return GivenValues(
         {item.name: item for item in clock},
-        context.parameter_files,
+        files,
         context.parameter_sections,
-        {} if is_inline else {item.name: item for item in entries(tree.get("parameters"))},
-        context.overrides.by_node.get(name, {}),
-        overridable,
+        own,
+        command_line,
+        frozenset(override_names(ports)) if may_override else frozenset(),
     )
 
 

@@ -18,7 +18,15 @@ from composer.language.tree_values import (
     text_or_opaque,
     value_or,
 )
-from composer.model import Executable, Introspection, OnFailure, RestartBudget, Supervision, Watch
+from composer.model import (
+    DEFAULT_INTROSPECTION,
+    Executable,
+    Introspection,
+    OnFailure,
+    RestartBudget,
+    Supervision,
+    Watch,
+)
 from composer.model.names import join
 
 
@@ -74,7 +82,7 @@ def _namespace(tree: Tree | None, system: Located[str]) -> Located[str]:
 
 def read_supervision(lifecycle: Tree | None, default: Supervision) -> Supervision:
     """Return the supervision under ``lifecycle`` of a node or a system, over ``default``."""
-    if not isinstance(lifecycle, Mapping):
+    if not isinstance(lifecycle, Mapping) or not lifecycle.entries:
         return default
     return Supervision(
         timeout_ms=value_or(number(lifecycle.get("timeout_ms")), default.timeout_ms),
@@ -124,10 +132,15 @@ def _watch(tree: Tree | None, default: Watch) -> Watch:
     )
 
 
+_INTROSPECTION = frozenset(field.name for field in fields(Introspection))
+
+
 def read_introspection(*layers: Tree | None) -> Introspection:
     """Merge ``introspection`` settings; later layers override earlier ones."""
     settings = {
-        entry.name: flag(entry.value, default=True) for layer in layers for entry in entries(layer)
+        entry.name: flag(entry.value, default=True)
+        for layer in layers
+        for entry in entries(layer)
+        if entry.name in _INTROSPECTION
     }
-    known = {field.name for field in fields(Introspection)}
-    return Introspection(**{name: value for name, value in settings.items() if name in known})
+    return Introspection(**settings) if settings else DEFAULT_INTROSPECTION

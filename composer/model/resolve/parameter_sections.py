@@ -50,6 +50,8 @@ class NamePatterns:
 
     def matching(self, name: str) -> list[str]:
         """Return the patterns that match the full name of a node."""
+        if not self._root.following:
+            return []
         branches = _with_no_parts([self._root])
         for part in parts_of(name):
             following = [branch for branch in branches if branch.is_any_parts]
@@ -154,6 +156,8 @@ class ParameterFiles:
 
     def unmatched(self, nodes: Iterable[Node]) -> tuple[UnmatchedParameters, ...]:
         """Return the sections, and parameters of patterns, that are for none of the nodes."""
+        if not self.sections:
+            return ()
         names = {name: node for node in nodes for name in (node.full_name, *node.inner_nodes)}
         search = _Search(self, names)
         return tuple(found for section in self.sections for found in search.unmatched(section))

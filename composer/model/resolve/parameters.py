@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from collections.abc import Mapping as Map
-from dataclasses import replace
 
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
 from composer.language.tree_values import (
@@ -243,21 +242,22 @@ def node_parameters(
 ) -> NodeParameters:
     """Return the parameters of a node with their values."""
     known = frozenset(item.name.value for item in declared) | given.overridable
-    in_files = given.files.given(names.full_name, None if gets_undeclared else known)
+    full_name = names.full_name
+    in_files = given.files.given(full_name, None if gets_undeclared else known)
     values = {**given.system, **in_files, **given.own, **given.command_line}
     overrides = _qos_overrides(declared, values, given.overridable)
     others = [item for item in declared if item.name.value not in overrides]
     unusable = [] if gets_undeclared else list(filter(_overrides_qos, others))
     usable = others if gets_undeclared else [item for item in others if not _overrides_qos(item)]
     parameters = with_use_sim_time(tuple(usable), values)
-    named = given.files.named(names.full_name)
+    named = given.files.named(full_name)
     overridden = {name: entry for name, entry in named.items() if name in given.own}
     replaced = (item for item in parameters if item.name.value in overridden)
     valued = (*with_values(parameters, values), *overrides.values())
     passed: tuple[Parameter, ...] = ()
     if gets_undeclared:
         passed = tuple(map(bare_parameter, undeclared(valued, values)))
-    own = ParameterSection(names.full_name, (*valued, *passed))
+    own = ParameterSection(full_name, (*valued, *passed))
     sections: tuple[ParameterSection, ...] = (own,) if is_program else ()
     if is_program and gets_undeclared:
         sections = _all_sections(declared, given, own, are_kept=names.are_kept)
@@ -269,7 +269,7 @@ def node_parameters(
         sections,
         overrides,
         (*(UnknownKey("parameters", item.name, ()) for item in unusable), *unknown),
-        len(given.files.names_for(names.full_name)) + len(sections),
+        len(given.files.names_for(full_name)) + len(sections),
     )
 
 
@@ -284,6 +284,8 @@ def _qos_overrides(
 
     They need no declaration, and a declaration counts as its default.
     """
+    if not overridable:
+        return {}
     given = (bare_parameter(values[name]) for name in values.keys() & overridable)
     found = {item.name.value: item for item in declared if item.name.value in overridable}
     found |= {item.name.value: item for item in given}

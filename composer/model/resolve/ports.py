@@ -132,6 +132,7 @@ def _log(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Template | N
 #: Default timeout of clients for the server and its response.
 DEFAULT_TIMEOUT_MS = 5000.0
 
+_SECTIONS = tuple((kind, kind.section) for kind in PortKind)
 _CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
 _INLINE_EVENTS = {
     PortKind.SUBSCRIPTION: Event.MESSAGE,
@@ -157,8 +158,8 @@ def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> t
     isolation = Isolation.SHARE if node.get("class") is None else Isolation.COPY
     return tuple(
         _port(kind, entry, qos, isolation, diagnostics)
-        for kind in PortKind
-        for entry in entries(node.get(kind.section))
+        for kind, section in _SECTIONS
+        for entry in entries(node.get(section))
     )
 
 
@@ -176,17 +177,18 @@ def _port(
 ) -> Port:
     span = entry.key.span
     tree = mapping(entry)
-    ros_name = text(tree.get(kind.channel.value)) or key(entry)
+    name = key(entry)
+    ros_name = text(tree.get(kind.channel.value)) or name
     accept = expression(tree.get("accept"), diagnostics)
     return Port(
-        kind=kind,
-        name=key(entry),
-        interface=text_or_opaque(tree.get("type"), span),
-        ros_name=ros_name,
-        full_name=ros_name.value,
-        qos=qos.resolve(tree.get("qos"), implicit_qos(kind.channel, span)),
-        span=span,
-        reactions=_reactions(kind, entry, tree, diagnostics),
+        kind,
+        name,
+        text_or_opaque(tree.get("type"), span),
+        ros_name,
+        ros_name.value,
+        qos.resolve(tree.get("qos"), implicit_qos(kind.channel, span)),
+        span,
+        _reactions(kind, entry, tree, diagnostics),
         timeout_ms=_timeout(kind, tree, span),
         result_timeout_ms=number(tree.get("result_timeout_ms")),
         accept=accept.value if accept is not None else None,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Mapping as Map
-from dataclasses import field, replace
+from dataclasses import field
 from functools import partial
 from typing import Any
 
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located, Span
 from composer.language.tree import Entry, Mapping, Scalar, Tree
 from composer.language.tree_values import choice, entries, integer, is_opaque, key, number, text

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import field, replace
+from dataclasses import field
 from functools import wraps
 from typing import Any, TypeAlias, TypeVar
 
 from composer.base.diagnostics import Diagnostic, Label, Rule, Severity
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.interfaces.definitions import parts

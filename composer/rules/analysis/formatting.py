@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import replace
 
 from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, shown
+from composer.base.fast_dataclass import replace
 from composer.model import PortKind, PortOfNode
 
 _LONG_VALUE = re.compile(rf"'([^']{{{MAXIMUM_VALUE_LENGTH + 1},}})'")

@@ -22,7 +22,6 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 
 from composer.base.diagnostics import (
     Diagnostic,
@@ -33,7 +32,7 @@ from composer.base.diagnostics import (
     line_subject,
     nearest,
 )
-from composer.base.fast_dataclass import dataclass
+from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.language.expressions import Expression
