@@ -8,8 +8,7 @@ by one, so that the builder can stop the parser early. Their marks count from 0,
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import field
-from typing import Protocol
+from typing import Any, Protocol
 
 import yaml
 
@@ -87,22 +86,27 @@ class _Anchored:
     height: int
 
 
-@dataclass(slots=True)
 class _Open:
     """A map or list that is not complete yet."""
 
-    start: Span
-    is_map: bool
-    is_flow: bool
-    anchor: str | None
-    items: list[Tree] = field(default_factory=list)
-    entries: list[Entry] = field(default_factory=list)
-    keys: dict[str, Scalar] = field(default_factory=dict)
-    key: Scalar | None = None  # None for an invalid key, whose value is dropped
-    awaits_value: bool = False
-    text_in_braces: Scalar | None = None
-    values: int = 1
-    height: int = 1
+    __slots__ = (
+        *("anchor", "awaits_value", "entries", "height", "is_flow", "is_map", "items", "key"),
+        *("keys", "start", "text_in_braces", "values"),
+    )
+
+    def __init__(self, start: Span, is_map: bool, is_flow: bool, anchor: str | None) -> None:
+        self.start = start
+        self.is_map = is_map
+        self.is_flow = is_flow
+        self.anchor = anchor
+        self.items: list[Tree] = []
+        self.entries: list[Entry] = []
+        self.keys: dict[str, Scalar] = {}
+        self.key: Scalar | None = None  # None for an invalid key, whose value is dropped
+        self.awaits_value = False
+        self.text_in_braces: Scalar | None = None
+        self.values = 1
+        self.height = 1
 
     def tree(self) -> Tree:
         """Return the finished map or list."""
@@ -131,6 +135,15 @@ class TreeBuilder:
         self._open: list[_Open] = []
         self._anchors: dict[str, _Anchored | None] = {}  # None while the value is being read
         self._values = 0
+        self._handlers: dict[type[yaml.Event], Callable[[Any], None]] = {
+            yaml.ScalarEvent: self._on_scalar,
+            yaml.MappingStartEvent: self._on_start,
+            yaml.MappingEndEvent: self._on_end,
+            yaml.SequenceStartEvent: self._on_start,
+            yaml.SequenceEndEvent: self._on_end,
+            yaml.AliasEvent: self._on_alias,
+            yaml.DocumentStartEvent: self._on_document,
+        }
 
     @property
     def open_bracket(self) -> Span | None:
@@ -139,19 +152,13 @@ class TreeBuilder:
 
     def handle(self, event: yaml.Event) -> None:
         """Handle the next event. Raises Stopped."""
-        match event:
-            case yaml.ScalarEvent():
-                self._on_scalar(event)
-            case yaml.MappingStartEvent() | yaml.SequenceStartEvent():
-                self._on_start(event)
-            case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
-                self._on_end()
-            case yaml.AliasEvent():
-                self._on_alias(event)
-            case yaml.DocumentStartEvent() if self.root is not None:
-                self._on_second_document(event)
+        handler = self._handlers.get(type(event))
+        if handler is not None:
+            handler(event)
 
-    def _on_second_document(self, event: yaml.DocumentStartEvent) -> None:
+    def _on_document(self, event: yaml.DocumentStartEvent) -> None:
+        if self.root is None:
+            return
         span = span_at(self._source, event.start_mark, 3)
         message = "a second document starts here"
         hint = "put each system or node type into its own file"
@@ -185,7 +192,7 @@ class TreeBuilder:
             self._anchors[event.anchor] = None
         self._open.append(_Open(start, is_map, bool(event.flow_style), event.anchor))
 
-    def _on_end(self) -> None:
+    def _on_end(self, _: yaml.CollectionEndEvent) -> None:
         ended = self._open.pop()
         tree = ended.tree()
         if ended.anchor is not None:
@@ -222,7 +229,8 @@ class TreeBuilder:
             return
         parent = self._open[-1]
         parent.values += values
-        parent.height = max(parent.height, height + 1)
+        if parent.height <= height:
+            parent.height = height + 1
         if not parent.is_map:
             parent.items.append(tree)
         elif parent.awaits_value:

@@ -127,7 +127,7 @@ class ParameterFileBuilder(TreeBuilder):
         hint = "write out the value, or quote the text"
         raise Stopped(Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint=hint))
 
-    def _on_second_document(self, event: yaml.DocumentStartEvent) -> None:
+    def _on_document(self, event: yaml.DocumentStartEvent) -> None:
         pass
 
     def _finish(self, tree: Tree) -> None:

@@ -7,14 +7,22 @@ file, and generating code from a schema takes a second. A test compares the resu
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import field
+from functools import cache
 from typing import Any, TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 
 Path: TypeAlias = tuple[str | int, ...]
 
+#: The keywords of a schema that check something, with their values and what checks them.
+_Checks: TypeAlias = list[tuple[str, Any, Callable[..., Any]]]
+#: A schema without reference, its checks, and whether some of them are those of inner values.
+_Resolved: TypeAlias = tuple[dict[str, Any], _Checks, bool]
+
 _DEFINITIONS = "#/definitions/"
+_compiled = cache(re.compile)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,27 +41,48 @@ class SchemaError:
 
 def schema_errors(content: Any, schema: dict[str, Any]) -> Iterator[SchemaError]:
     """Yield the errors of ``content``. Raises KeyError for an unsupported keyword of the schema."""
-    return _Validator(schema.get("definitions", {})).errors(content, schema, ())
+    yield from _Validator(schema.get("definitions", {})).errors(content, schema, ())
 
 
 @dataclass(frozen=True, slots=True)
 class _Validator:
     definitions: dict[str, Any]
+    _resolved: dict[int, _Resolved] = field(default_factory=dict)  # by the identity of the schema
 
-    def errors(self, value: Any, schema: dict[str, Any], path: Path) -> Iterator[SchemaError]:
+    def errors(self, value: Any, schema: dict[str, Any], path: Path) -> Iterable[SchemaError]:
+        found = self._resolved.get(id(schema))
+        if found is None:
+            found = self._resolved[id(schema)] = self._resolve(schema)
+        own, checks, has_inner = found
+        if has_inner:
+            return self._all_errors(value, own, path, checks)
+        return [
+            SchemaError(path, keyword, required, value, own)
+            for keyword, required, check in checks
+            if not check(self, value, required)
+        ]
+
+    def _resolve(self, schema: dict[str, Any]) -> _Resolved:
         while "$ref" in schema:  # keywords next to it are ignored
             schema = self.definitions[schema["$ref"].removeprefix(_DEFINITIONS)]
-        for keyword, required in schema.items():
-            if keyword in _IGNORED:
-                continue
-            inner = _INNER.get(keyword)
-            if inner is not None:
-                yield from inner(self, value, schema, path)
-            elif not _CHECKS[keyword](self, value, required):
+        keywords = [(name, required) for name, required in schema.items() if name not in _IGNORED]
+        checks = [
+            (name, required, _INNER[name] if name in _INNER else _CHECKS[name])
+            for name, required in keywords
+        ]
+        return schema, checks, any(name in _INNER for name, _ in keywords)
+
+    def _all_errors(
+        self, value: Any, schema: dict[str, Any], path: Path, checks: _Checks
+    ) -> Iterator[SchemaError]:
+        for keyword, required, check in checks:
+            if keyword in _INNER:
+                yield from check(self, value, schema, path)
+            elif not check(self, value, required):
                 yield SchemaError(path, keyword, required, value, schema)
 
     def is_valid(self, value: Any, schema: dict[str, Any]) -> bool:
-        return next(self.errors(value, schema, ()), None) is None
+        return next(iter(self.errors(value, schema, ())), None) is None
 
     def properties(self, value: Any, schema: dict[str, Any], path: Path) -> Iterator[SchemaError]:
         if type(value) is dict:
@@ -102,7 +131,7 @@ _PYTHON_TYPES: dict[str, frozenset[type]] = {
 _NUMBERS = _PYTHON_TYPES["number"]
 
 
-def _has_type(value: Any, required: str | list[str]) -> bool:
+def _has_type(_: _Validator, value: Any, required: str | list[str]) -> bool:
     if isinstance(required, str):
         return type(value) in _PYTHON_TYPES[required]
     return any(type(value) in _PYTHON_TYPES[name] for name in required)
@@ -122,12 +151,12 @@ _INNER: dict[str, Callable[[_Validator, Any, dict[str, Any], Path], Iterator[Sch
 }
 #: Keywords that a value satisfies or not.
 _CHECKS: dict[str, Callable[[_Validator, Any, Any], bool]] = {
-    "type": lambda _, value, required: _has_type(value, required),
+    "type": _has_type,
     "enum": lambda _, value, words: any(
         type(word) is type(value) and word == value for word in words
     ),
     "pattern": lambda _, value, pattern: (
-        type(value) is not str or re.search(pattern, value) is not None
+        type(value) is not str or _compiled(pattern).search(value) is not None
     ),
     "minimum": lambda _, value, least: type(value) not in _NUMBERS or value >= least,
     "maximum": lambda _, value, most: type(value) not in _NUMBERS or value <= most,
