@@ -15,10 +15,11 @@ from composer.base.source import Span, shown_path
 from composer.model import BehaviorReference
 from composer.project import Project
 from composer.python_code.modules import (
+    PYTHON_SUFFIX,
     Unreadable,
-    is_compiled,
     local_module_file,
     module_file,
+    module_origin,
     relative_module_file,
 )
 from composer.python_code.syntax import Class, Method, Module, read_module
@@ -102,18 +103,24 @@ class BehaviorSource:
         return self.by_name.get(name)
 
 
-def find_behavior(reference: BehaviorReference) -> BehaviorSource:
-    """Read the class that ``reference`` names. Never raises, never imports."""
-    reader = _Reader(reference.folder, Project.at(reference.folder))
+def find_behavior(
+    reference: BehaviorReference, project_at: Callable[[Path], Project] = Project.at
+) -> BehaviorSource:
+    """Read the class that ``reference`` names. Never raises, never imports.
+
+    ``project_at`` returns the project of a folder.
+    """
+    reader = _Reader(reference.folder, project_at(reference.folder))
     try:
-        path = module_file(reference.module, reference.folder, reader.project)
-        module = reader.module(path) if path is not None else None
+        path = module_origin(reference.module, reference.folder, reader.project)
+        is_source = path is not None and path.suffix == PYTHON_SUFFIX
+        module = reader.module(path) if path is not None and is_source else None
     except Unreadable as error:
         broken = tuple(reader.broken.values())
         return BehaviorSource(reference, module_found=True, problem=str(error), broken=broken)
     if module is None:
-        compiled = is_compiled(reference.module)
-        return BehaviorSource(reference, module_found=compiled, class_found=compiled)
+        is_compiled = path is not None and not is_source
+        return BehaviorSource(reference, module_found=is_compiled, class_found=is_compiled)
     start = reader.lookup(module, reference.class_name)
     classes = [*reader.with_bases(*start)] if start is not None else []
     if classes:

@@ -10,6 +10,7 @@ import sys
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 
 from composer.base.diagnostics import nearest
@@ -20,6 +21,7 @@ from composer.base.source import Span
 from composer.project import Project
 
 MAXIMUM_BYTES = 250_000
+PYTHON_SUFFIX = ".py"
 #: Files of these types in a package may be modules that are compiled when it is built.
 _COMPILED = (".c", ".cpp", ".pyx", ".pyd", ".so")
 
@@ -38,18 +40,23 @@ class Unreadable(Exception):
         self.span = span
 
 
-def module_file(module: str, folder: Path, project: Project) -> Path | None:
+def module_origin(module: str, folder: Path, project: Project) -> Path | None:
     """Return the file of ``module``, a dotted name, or None.
 
     Searches next to the YAML file (``folder``), in the node type folders of its project, and on
-    Python's module search path. Raises Unreadable for a symbolic link out of the project and for a
-    file of another user.
+    Python's module search path. The suffix of a compiled or built-in module is not PYTHON_SUFFIX.
+    Raises Unreadable for a symbolic link out of the project and for a file of another user.
     """
     parts = module.split(".")
     if not all(part.isidentifier() for part in parts):
         return None
-    found = local_module_file(module, folder, project) or _installed(parts)
-    return found if found is not None and found.suffix == ".py" else None
+    return local_module_file(module, folder, project) or _installed(parts)
+
+
+def module_file(module: str, folder: Path, project: Project) -> Path | None:
+    """Return the Python file of ``module``, as :func:`module_origin` finds it, or None."""
+    found = module_origin(module, folder, project)
+    return found if found is not None and found.suffix == PYTHON_SUFFIX else None
 
 
 def local_module_file(module: str, folder: Path, project: Project) -> Path | None:
@@ -64,13 +71,6 @@ def local_module_file(module: str, folder: Path, project: Project) -> Path | Non
         if found is not None:
             return _checked(found, project)
     return None
-
-
-def is_compiled(module: str) -> bool:
-    """Return whether ``module`` exists without Python source: compiled or built in."""
-    parts = module.split(".")
-    origin = _installed(parts) if all(part.isidentifier() for part in parts) else None
-    return origin is not None and origin.suffix != ".py"
 
 
 def relative_module_file(module: str, level: int, importer: Path) -> Path | None:
@@ -175,10 +175,15 @@ class NearbyModules:
 
         Python's own modules have no classes of nodes.
         """
-        installed = () if self.package else _modules_in(map(Path, sys.path))
-        names = [name for name in installed if name not in sys.stdlib_module_names]
-        close = self.similar or nearest(self.missing, names)
+        installed = () if self.package else _installed_modules(tuple(sys.path))
+        close = self.similar or nearest(self.missing, installed)
         return f"did you mean '{close}'?" if close is not None else None
+
+
+@lru_cache(maxsize=1)  # for hints, a module that was installed meanwhile may be missing
+def _installed_modules(search_path: tuple[str, ...]) -> tuple[str, ...]:
+    names = _modules_in(map(Path, search_path))
+    return tuple(name for name in names if name not in sys.stdlib_module_names)
 
 
 def nearby_modules(module: str, folders: Iterable[Path]) -> NearbyModules:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -14,6 +15,7 @@ from composer.base.source import Located
 from composer.language.tree_values import is_opaque
 from composer.model import Node, Parameter, Port, PortKind, System
 from composer.model.resolve.parameters import rclpy_type
+from composer.project import Project
 from composer.python_code.lookup import BehaviorSource, find_behavior
 from composer.python_code.scopes import Scope
 from composer.python_code.syntax import Method, scopes_in
@@ -86,6 +88,7 @@ _PORT_HANDLERS: Mapping[PortKind, Mapping[str, Signature]] = {
 def node_classes(system: System) -> tuple[NodeClass, ...]:
     """Return every node with a behavior or a class, and its source; each class is read once."""
     read: dict[tuple[str, Path], BehaviorSource] = {}
+    project_at = cache(Project.at)
     classes = []
     for node in system.nodes:
         hosted = node.hosted_class if node.external is None else None
@@ -96,7 +99,7 @@ def node_classes(system: System) -> tuple[NodeClass, ...]:
             continue  # a rule reports it
         key = (reference.text.value, reference.folder)
         if key not in read:
-            read[key] = find_behavior(reference)
+            read[key] = find_behavior(reference, project_at)
         classes.append((node, read[key]))
     return tuple(classes)
 

@@ -26,7 +26,7 @@ from composer.project.executables import (
     has_package,
     has_ros_packages,
 )
-from composer.rules.analysis.context import Context, is_unresolved
+from composer.rules.analysis.context import Context, is_unresolved, limited
 from composer.rules.analysis.subjects import is_misspelled
 from composer.rules.implementations import SETTING_WITHOUT_EFFECT
 from composer.rules.processes import CONFLICTING_PROCESS
@@ -114,6 +114,7 @@ def _file_names(folder: Path) -> list[str]:
     return [path.name for path in folder.iterdir()] if folder.is_dir() else []
 
 
+@limited
 def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
     """Look for the packages, and for programs in PATH."""
     for node in context.system.nodes:

@@ -45,18 +45,19 @@ def check_unknown_qos_profile(context: Context) -> Iterator[Diagnostic]:
     """
     if context.system.node_type:
         return
+    known = known_profiles(context)
     for name in context.once(unknown_profiles):
         hint = (
             "omit 'qos' to use rclpy's defaults, or use 'command', which is the same"
             if name.value == "default"
-            else suggestion(name.value, known_profiles(context))
+            else suggestion(name.value, known)
         )
         yield Diagnostic(
             UNDECLARED_NAME,
             f"there is no QoS profile '{name}'",
             name.span,
             hint=hint,
-            subjects=unknown_subjects("QoS profile", name.value, known_profiles(context)),
+            subjects=unknown_subjects("QoS profile", name.value, known),
         )
 
 

@@ -86,17 +86,15 @@ def _direction(
 ) -> Iterator[list[QosConflict]]:
     if not requesting:
         return
-    all_together = strictest([profile for profile, _ in requesting])
+    all_requests = _Requests.of(requesting)
     for offered, offers in offering:
-        if not incompatibilities(offered, all_together):
-            continue
-        found = list(islice(_conflicting(offered, requesting), _MAX_CONFLICTS))
-        all_requests = [endpoint for _, requests in found for endpoint in requests]
+        found = list(islice(all_requests.conflicting(offered), _MAX_CONFLICTS))
+        wanting = [endpoint for _, requests in found for endpoint in requests]
         by_place: dict[tuple[str, int, int], list[QosConflict]] = defaultdict(list)
         for problems, requests in found:
             fits_others = len(found) < len(requesting)
             is_offer = not (fits_others and _is_of_streams(problems)) and _is_offer_wrong(
-                context, problems, offers, all_requests
+                context, problems, offers, wanting
             )
             place = _place(context, (offers if is_offer else requests)[0], problems[0].policy)
             conflict = QosConflict(problems, tuple(offers), tuple(requests), is_offer, place)
@@ -104,13 +102,31 @@ def _direction(
         yield from by_place.values()
 
 
-def _conflicting(
-    offered: QosProfile, requesting: _Groups
-) -> Iterator[tuple[tuple[Incompatibility, ...], list[PortOfNode]]]:
-    for requested, requests in requesting:
-        problems = incompatibilities(offered, requested)
-        if problems:
-            yield problems, requests
+@dataclass(frozen=True, slots=True)
+class _Requests:
+    """Endpoints with one profile, or two halves of more: halves that match are not searched."""
+
+    strictest: QosProfile
+    endpoints: list[PortOfNode]
+    halves: tuple[_Requests, ...] = ()
+
+    @classmethod
+    def of(cls, groups: _Groups) -> _Requests:
+        if len(groups) == 1:
+            return cls(*groups[0])
+        middle = len(groups) // 2
+        halves = cls.of(groups[:middle]), cls.of(groups[middle:])
+        return cls(strictest([half.strictest for half in halves]), [], halves)
+
+    def conflicting(
+        self, offered: QosProfile
+    ) -> Iterator[tuple[tuple[Incompatibility, ...], list[PortOfNode]]]:
+        """Yield why endpoints with one profile do not match an offer, with the endpoints."""
+        problems = incompatibilities(offered, self.strictest)
+        if problems and not self.halves:
+            yield problems, self.endpoints
+        for half in self.halves if problems else ():
+            yield from half.conflicting(offered)
 
 
 def _is_of_streams(problems: Sequence[Incompatibility]) -> bool:

@@ -29,7 +29,7 @@ MAX_ENTRIES = 5_000
 MAX_ERRORS = 500
 
 #: Places at which a check of every port finds something that is not an error.
-MAX_FINDINGS = 2_000
+MAX_FINDINGS = 1_000
 
 #: Copies made by all ``for_each`` of one file.
 MAX_COPIES = 5_000

@@ -14,7 +14,7 @@ from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.project import Project
 from composer.python_code.lookup import BehaviorSource
-from composer.python_code.modules import is_compiled, module_below, module_file, nearby_modules
+from composer.python_code.modules import module_below, module_origin, nearby_modules
 from composer.python_code.problems import Family
 from composer.python_code.stubs.folder import LIBRARIES
 from composer.python_code.syntax import Module, defined_names
@@ -145,4 +145,4 @@ class Imports:
 def _is_installed(name: str) -> bool:
     """Return whether a module outside of the project exists."""
     home = Path(__file__).parent
-    return is_compiled(name) or module_file(name, home, Project.at(home)) is not None
+    return module_origin(name, home, Project.at(home)) is not None
