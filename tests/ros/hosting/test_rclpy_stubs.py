@@ -6,6 +6,7 @@ import ast
 import importlib
 import inspect
 import sys
+from functools import cache
 from pathlib import Path
 from textwrap import dedent
 from typing import Any
@@ -53,20 +54,32 @@ def names(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     return found
 
 
-STUBS = {module: names(ast.parse(path.read_text()).body) for module, path in MODULES.items()}
-CLASSES: dict[str, ast.ClassDef] = {
-    f"{module}.{name}": item
-    for module, stub in STUBS.items()
-    for name, item in stub.items()
-    if isinstance(item, ast.ClassDef) and not name.startswith("_")
-}
-FUNCTIONS: dict[str, Any] = {
-    f"{owner}.{name}": item
-    for owner, stub in [*STUBS.items(), *((key, names(item.body)) for key, item in CLASSES.items())]
-    for name, item in stub.items()
-    if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef)
-    and (name in {"__init__", "__new__"} or not name.startswith("_"))
-}
+@cache  # when the first test needs it: each worker imports this module
+def stubs() -> dict[str, dict[str, ast.stmt]]:
+    """The names of each stub."""
+    return {module: names(ast.parse(path.read_text()).body) for module, path in MODULES.items()}
+
+
+@cache
+def classes() -> dict[str, ast.ClassDef]:
+    return {
+        f"{module}.{name}": item
+        for module, stub in stubs().items()
+        for name, item in stub.items()
+        if isinstance(item, ast.ClassDef) and not name.startswith("_")
+    }
+
+
+@cache
+def functions() -> dict[str, Any]:
+    owners = {**stubs(), **{key: names(item.body) for key, item in classes().items()}}
+    return {
+        f"{owner}.{name}": item
+        for owner, stub in owners.items()
+        for name, item in stub.items()
+        if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (name in {"__init__", "__new__"} or not name.startswith("_"))
+    }
 
 
 def find(name: str) -> Any:
@@ -97,7 +110,7 @@ def attributes(cls: type) -> set[str]:
 
 @pytest.mark.parametrize("module", MODULES)
 def test_no_name_of_a_module_is_missing_or_made_up(module: str) -> None:
-    stub, real = STUBS[module], importlib.import_module(module)
+    stub, real = stubs()[module], importlib.import_module(module)
     public = {
         name: getattr(value, "__module__", "" if name.isupper() else "sys")
         for name, value in vars(real).items()
@@ -112,7 +125,7 @@ def test_no_name_of_a_module_is_missing_or_made_up(module: str) -> None:
 
 
 def test_no_attribute_of_a_class_is_missing_or_made_up() -> None:
-    described = {find(name): set(names(item.body)) for name, item in CLASSES.items()}
+    described = {find(name): set(names(item.body)) for name, item in classes().items()}
     for cls, defined in described.items():
         own = [base for base in cls.__mro__ if base.__module__.startswith("rclpy")]
         standard = {key for base in cls.__mro__ if base not in own for key in dir(base)}
@@ -125,9 +138,9 @@ def test_no_attribute_of_a_class_is_missing_or_made_up() -> None:
 
 
 def test_functions_take_what_those_of_rclpy_take() -> None:
-    functions = {name: getattr(find(name), "__func__", find(name)) for name in FUNCTIONS}
+    real = {name: getattr(find(name), "__func__", find(name)) for name in functions()}
     # The others are properties, or compiled.
-    plain = {name: item for name, item in functions.items() if inspect.isfunction(item)}
+    plain = {name: item for name, item in real.items() if inspect.isfunction(item)}
     assert len(plain) > 200
     for name, function in plain.items():
         check_parameters(name, [*inspect.signature(function).parameters.values()])
@@ -138,7 +151,7 @@ def check_parameters(name: str, parameters: list[inspect.Parameter]) -> None:
     expected = [
         item for item in parameters if item.kind not in {item.VAR_KEYWORD, item.VAR_POSITIONAL}
     ]
-    stub = FUNCTIONS[name].args
+    stub = functions()[name].args
     plain = [item.arg for item in (*stub.posonlyargs, *stub.args)]
     optional = {*plain[len(plain) - len(stub.defaults) :]}
     keywords = {

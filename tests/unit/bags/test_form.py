@@ -9,7 +9,9 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -34,7 +36,6 @@ from composer.bags.writer import BagWriter, SplitLimits
 from composer.interfaces import Interfaces
 from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPES = (
     "std_msgs/msg/String",
     "nav_msgs/msg/Odometry",
@@ -47,11 +48,16 @@ ALL = (0, 2**62)
 START_NS = 1_700_000_000_000_000_000
 
 
+@cache
+def store() -> Any:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
 def text(content: str) -> bytes:
     """Return a serialized std_msgs/String."""
     type_name = "std_msgs/msg/String"
-    message = STORE.types[type_name](data=content)
-    return bytes(STORE.serialize_cdr(message, type_name))
+    message = store().types[type_name](data=content)
+    return bytes(store().serialize_cdr(message, type_name))
 
 
 def write(
@@ -115,13 +121,13 @@ def test_definitions_are_complete(type_name: str) -> None:
     found = get_types_from_msg(full_definition(type_name, Interfaces.load()), type_name)
     assert type_name in found
     for name, (_, fields) in found.items():
-        assert fields == STORE.fielddefs[name][1], name
+        assert fields == store().fielddefs[name][1], name
     nested = {name for _, (_, fields) in found.items() for name in _messages_in(fields)}
     assert nested == found.keys() - {type_name}
 
 
 def _messages_in(fields: object) -> set[str]:
-    return {name for name in STORE.fielddefs if f"'{name}'" in repr(fields)}
+    return {name for name in store().fielddefs if f"'{name}'" in repr(fields)}
 
 
 @pytest.mark.parametrize(
@@ -164,7 +170,7 @@ def test_numbers_of_older_versions_are_read() -> None:
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
 def test_we_read_what_rosbags_writes(tmp_path: Path, plugin: StoragePlugin) -> None:
     with RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
-        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=STORE)
+        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=store())
         for number in range(20):
             writer.write(connection, START_NS + number, text(str(number)))
     bag = open_bag(tmp_path / "bag")
@@ -207,7 +213,7 @@ def test_we_read_what_rosbag2_and_users_make_of_it(
     tmp_path: Path, plugin: StoragePlugin, change: Callable[[Path], None]
 ) -> None:
     with RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
-        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=STORE)
+        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=store())
         for number in range(20):
             writer.write(connection, START_NS + number, text(str(number)))
     change(tmp_path / "bag")
@@ -221,6 +227,7 @@ def test_we_read_what_rosbag2_and_users_make_of_it(
 _ENDED = """
 import os, signal, sys
 from pathlib import Path
+from typing import Any
 from composer.bags.reader import open_bag
 from composer.cli.support.bags import bag_errors
 signal.signal(int(sys.argv[2]), signal.SIG_DFL)  # which these tests may have been started to ignore
@@ -264,7 +271,7 @@ def test_compressed_messages(tmp_path: Path) -> None:
     for name, add_size in (("bag", True), ("no-size", False)):
         options = {"version": 9, "storage_plugin": StoragePlugin.SQLITE3}
         with RosbagsWriter(tmp_path / name, **options) as writer:
-            connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=STORE)
+            connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=store())
             writer.write(connection, START_NS, text("a" * 1000))
         _compress_messages(tmp_path / name, add_size)
     assert [item.data for item in read(open_bag(tmp_path / "bag"))] == [text("a" * 1000)]

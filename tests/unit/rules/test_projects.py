@@ -18,7 +18,9 @@ from tests.unit.support.checking import (
     write_files,
 )
 
-PROJECTS = yaml.safe_load(Path(__file__).with_name("projects.yaml").read_text(encoding="utf-8"))
+PROJECTS = yaml.load(
+    Path(__file__).with_name("projects.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader
+)
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,8 @@ class Statements:
 
     @classmethod
     def read(cls, name: str) -> Statements:
-        return cls(**yaml.safe_load((FOLDER / f"{name}.yaml").read_text(encoding="utf-8")))
+        text = (FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
+        return cls(**yaml.load(text, yaml.CSafeLoader))
 
     def code_with(self, place: str = "", statement: str = "") -> str:
         """Return the code with a statement in one place, and ``pass`` in the others."""
