@@ -31,7 +31,7 @@ _RECOVERED_WITHIN_S = 0.5
 
 @dataclass(slots=True)
 class _ObservedCallback:
-    """A running callback. ``since_s`` is when it was first observed, or later after late checks."""
+    """A running callback. ``since_s`` is the time of the check that observed it first."""
 
     callback: RunningCallback
     loop: str
@@ -40,6 +40,24 @@ class _ObservedCallback:
     limit_s: float = math.inf
     interrupted_s: float | None = None
     is_lost: bool = False
+
+
+class CheckTime:
+    """The time of periodic checks. A late check counts at most as two periods.
+
+    What delayed the check may have delayed the callbacks too.
+    """
+
+    def __init__(self, period_s: float, now_s: float) -> None:
+        self._period_s = period_s
+        self._checked_s = now_s
+        self._late_s = 0.0  # the delays of all checks together
+
+    def advance(self, now_s: float) -> float:
+        """Return the time of a check at ``now_s``."""
+        self._late_s += max(now_s - self._checked_s - 2.0 * self._period_s, 0.0)
+        self._checked_s = now_s
+        return now_s - self._late_s
 
 
 class HealthMonitor:
@@ -59,7 +77,7 @@ class HealthMonitor:
         ]
         self._silent: dict[str, _Activation] = {}  # nodes that were reported in their activation
         self._period_s = _period_s(context.node_set)
-        self._checked_s = self._clock.monotonic()
+        self._time = CheckTime(self._period_s, self._clock.monotonic())
         self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="health monitor", daemon=True)
 
@@ -83,9 +101,9 @@ class HealthMonitor:
         while not self._clock.wait(self._end, self._period_s):
             now_s = self._clock.monotonic()
             self._serial = self._context.desired.value.serial
-            self._forgive_delay(now_s)
-            self._check_callbacks(now_s)
-            self._check_hung_loops(now_s)
+            check_s = self._time.advance(now_s)
+            self._check_callbacks(check_s)
+            self._check_hung_loops(check_s)
             if self._system_is_up:
                 self._check_silences(now_s)
 
@@ -106,16 +124,6 @@ class HealthMonitor:
                 )
 
     # --- callbacks
-
-    def _forgive_delay(self, now_s: float) -> None:
-        """Let a late check count at most as two: what delayed it may have delayed callbacks too."""
-        late_s = now_s - self._checked_s - 2.0 * self._period_s
-        self._checked_s = now_s
-        if late_s > 0.0:
-            for observed in self._callbacks.values():
-                observed.since_s += late_s
-                if observed.interrupted_s is not None:
-                    observed.interrupted_s += late_s
 
     def _check_callbacks(self, now_s: float) -> None:
         before, self._callbacks = self._callbacks, {}

@@ -17,12 +17,29 @@ from composer.cli.support.console import FileDescriptor, OutputQueue
 LIMIT_S = 60.0
 
 
-def queue_to(fd: int, max_waiting: int = 1_048_576) -> OutputQueue:
-    return OutputQueue(
-        FileDescriptor(fd),
-        lambda count: f"... {count} lines dropped: the output was blocked\n",
-        max_waiting,
-    )
+def note(count: int) -> str:
+    return f"... {count} lines dropped: the output was blocked\n"
+
+
+def queue_to(fd: int, name: str = "console") -> OutputQueue:
+    return OutputQueue(FileDescriptor(fd), note, name=name)
+
+
+class HeldSink:
+    """Accepts everything, once it may."""
+
+    def __init__(self) -> None:
+        self.taken, self.may_write = threading.Event(), threading.Event()
+        self.written = b""
+
+    def write(self, data: bytes) -> int:
+        self.taken.set()
+        self.may_write.wait(LIMIT_S)
+        self.written += data
+        return len(data)
+
+    def close(self) -> None:
+        pass
 
 
 class FullPipe:
@@ -55,24 +72,17 @@ def test_text_is_written_in_order() -> None:
 
 
 def test_the_oldest_lines_are_dropped_and_counted_while_nothing_reads() -> None:
-    pipe = FullPipe()
-    queue = queue_to(pipe.writing, max_waiting=50)
-    pipe.close_writing()
+    sink = HeldSink()
+    queue = OutputQueue(sink, note, max_waiting=50)
     queue.put("first\n")
-    while queue._texts:  # until the thread has taken it
-        threading.Event().wait(0.001)
+    assert sink.taken.wait(LIMIT_S)
     for number in range(100):
         queue.put(f"line {number:02}\n")
-    received: list[bytes] = []
-    reader = threading.Thread(target=lambda: received.append(pipe.read()))
-    reader.start()
-    while queue._texts:  # the end does not wait for a reader that makes no progress
-        threading.Event().wait(0.001)
+    sink.may_write.set()
     queue.close()
-    reader.join(LIMIT_S)
-    first, note, *rest = received[0].decode().splitlines()
+    first, dropped, *rest = sink.written.decode().splitlines()
     assert first == "first"
-    assert note == "... 94 lines dropped: the output was blocked"
+    assert dropped == "... 94 lines dropped: the output was blocked"
     assert rest == [f"line {number:02}" for number in range(94, 100)]
 
 
@@ -90,12 +100,13 @@ def test_the_end_does_not_wait_for_a_pipe_that_nothing_reads() -> None:
 
 def test_the_end_waits_for_a_reader_that_was_stopped() -> None:
     pipe = FullPipe()
-    queue = queue_to(pipe.writing)
+    queue = queue_to(pipe.writing, "stopped reader")
     pipe.close_writing()
     queue.put("text\n")
     received: list[bytes] = []
     reader = threading.Thread(target=lambda: received.append(pipe.read()))
-    writer, waits = queue._thread, 0
+    (writer,) = (item for item in threading.enumerate() if item.name == "stopped reader")
+    waits = 0
 
     def join(timeout: float) -> None:
         nonlocal waits

@@ -19,7 +19,8 @@ from composer.model import ExecutorKind
 from composer.runtime.executors import readiness
 from composer.runtime.executors.futures import Future, done_event
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.readiness import EntitySource, SourceGroup
+from composer.runtime.executors.readiness import EntitySource
+from composer.runtime.executors.sources import SubscriptionSource
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.loops import Bench, bench, peer
 
@@ -123,11 +124,6 @@ def test_a_response_behind_those_to_other_clients_is_taken_at_once(on: Bench) ->
     on.node.destroy_client(probe)
 
 
-def group_of(on: Bench, subscription: object) -> SourceGroup:
-    assert isinstance(on.loop, Loop)
-    return on.loop._group_of[subscription]
-
-
 class RaisingOnce(tuple[EntitySource, ...]):
     """Sources whose first iteration raises, as an asynchronous exception would."""
 
@@ -142,11 +138,12 @@ class RaisingOnce(tuple[EntitySource, ...]):
 
 def test_an_exception_between_two_callbacks_loses_nothing(on: Bench) -> None:
     seen: list[int] = []
-    subscription = on.subscribe(Int64, "numbers", lambda message: seen.append(message.data))
+    subscription = on.node.create_subscription(Int64, "numbers", lambda _: None, 10)
+    source = SubscriptionSource(subscription, lambda taken: seen.append(taken[0].data))
+    group = on.loop.add_group(source)
+    group.sources = RaisingOnce(group.sources)
     publisher = on.node.create_publisher(Int64, "numbers", 10)
     wait_until(publisher.get_subscription_count)
-    group = group_of(on, subscription)
-    group.sources = RaisingOnce(group.sources)
 
     def publish() -> None:
         for number in range(5):
@@ -155,6 +152,7 @@ def test_an_exception_between_two_callbacks_loses_nothing(on: Bench) -> None:
     on.loop.run(publish, 60.0)
     wait_until(lambda: seen == [0, 1, 2, 3, 4])
     assert on.errors() == [SystemExit]
+    on.loop.remove_group(group)
 
 
 def test_destroying_before_removing_is_harmless(on: Bench) -> None:

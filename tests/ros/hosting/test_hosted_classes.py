@@ -33,12 +33,11 @@ nodes:
 
 def test_messages_between_hosted_classes_stay_in_the_process(tmp_path: Path) -> None:
     with running(TALKER_AND_LISTENER, tmp_path) as system:
-        talker, listener = system.node("talker").instance, system.node("listener").instance
+        listener = system.node("listener").instance
         wait_until(lambda: len(listener.numbers) >= 5 and len(listener.infos) >= 5)
         assert listener.numbers[:5] == [1, 2, 3, 4, 5]
-        assert [number for number, _ in listener.infos[:5]] == [1, 2, 3, 4, 5]
-        publisher = system.node("talker")._entities._ports[talker.publisher]
-        assert not publisher.gated._has_external
+        # The middleware numbers its messages: in-process messages have no number.
+        assert listener.infos[:5] == [(number, None) for number in range(1, 6)]
         counted = system.summary("/listener")
     assert counted.errors == 0
     assert counted.received >= 10

@@ -24,8 +24,6 @@ from composer.runtime.supervision.events import NodeFailed
 from tests.ros.members.split_robot import command_of, split
 from tests.ros.support.in_process import Peer, finished, wait_until
 
-#: What a service keeps of requests that it has not taken yet.
-QUEUE = 10
 TEXT = """
 system: robot
 namespace: lab
@@ -48,6 +46,7 @@ class Busy(Behavior):
         if folder and not Path(folder, "busy").exists():
             Path(folder, "busy").touch()
             ctypes.PyDLL(None).usleep(1_500_000)
+            Path(folder, "free").touch()
 """
 SERVICE = "/lab/robot/other/manager/request"
 STATE = "/lab/robot/other/manager/state"
@@ -60,13 +59,15 @@ def test_a_request_that_a_full_queue_has_dropped_is_sent_again(tmp_path: Path, p
         peer.wait_until_known("/lab/camera")
         flood = peer.client(RequestService, SERVICE)
         of_another = request_message(ChangeStates("that of another process", "", 0, ()))
-        requests = system.host._node_set.other_processes._processes["other"].requests
         assert peer.set_parameter("/lab/camera", "folder", str(tmp_path)) == ""
         wait_until(tmp_path.joinpath("busy").exists, "the process")
         pause = peer.begin(Trigger, "/lab/robot/manager/pause")
-        wait_until(lambda: any(requests._sent.values()), "the request")
-        for _ in range(QUEUE + 2):
+
+        def is_free() -> bool:  # the service keeps the last 10 requests that came before
             flood.call_async(of_another)
+            return tmp_path.joinpath("free").exists()
+
+        wait_until(is_free, "the end of its work")
         assert finished(pause).success
         wait_until(lambda: labels(moves) == ["deactivating", "inactive"], "the transitions")
         assert not system.reported(NodeFailed)

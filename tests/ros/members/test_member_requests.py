@@ -49,6 +49,7 @@ class Process:
         self.steps: list[str] = []
         self.ids: list[tuple[str, int]] = []
         self.seen: list[int] = []
+        self.meant: list[str] = []
         bench.serve(RequestService, SERVICE, self._on_request)
 
     def _on_request(self, message: RequestService.Request, reply: Reply) -> None:
@@ -56,6 +57,7 @@ class Process:
         self.steps += map(str, request.steps)
         self.ids += [(request.sender, step.number) for step in request.steps]
         self.seen.append(request.seen_report)
+        self.meant.append(request.participant)
         if self.answers:
             results = (StepResult(success=True, report=1),) * len(request.steps)
             reply(answer_message(StepResults(results)))
@@ -81,7 +83,7 @@ def requests_of(on: Bench, on_problem: Callable[[str], None]) -> MemberRequests:
 
 def client(on: Bench, problems: list[str] | None = None) -> MemberRequests:
     requests = requests_of(on, ([] if problems is None else problems).append)
-    wait_until(requests._client.service_is_ready, "the service")
+    wait_until(lambda: servers_of(on.node, SERVICE), "the service")
     return requests
 
 
@@ -275,24 +277,23 @@ KILLED = "00" * 12
 
 @pytest.mark.parametrize("is_discovered", [True, False])
 def test_a_request_waits_for_the_service_of_the_process_that_has_reported(
-    is_discovered: bool,
+    is_discovered: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Not for that of a killed one, nor forever: other middleware may have other ids."""
+    monkeypatch.setattr(member_requests, "DISCOVERED_WITHIN_S", 1e6 if is_discovered else 0.1)
     with bench(ExecutorKind.EVENTS) as on:
         process = Process(on)
         process.answers = True
         requests = client(on)
         on.loop.run(lambda: requests.on_report(report_of(KILLED)))
         result = on.loop.run(lambda: requests.request("/arm", "activate"))
-        assert not on.loop.run(requests._is_ready)
-        assert not requests._sent
+        (server,) = servers_of(on.node, SERVICE)
+        own = participant(server).hex()
         if is_discovered:
-            (server,) = servers_of(on.node, SERVICE)
-            report = report_of(participant(server).hex())
-            on.loop.run(lambda: requests.on_report(report))
-        else:
-            requests._awaited_until_s = 0.0
+            on.loop.run(lambda: None)  # what the request has scheduled
+            on.loop.run(lambda: requests.on_report(report_of(own)))
         wait_until(result.done, "the response")
+        assert process.meant == [own if is_discovered else KILLED]
 
 
 def test_a_refused_request_says_why() -> None:

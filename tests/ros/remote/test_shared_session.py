@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from composer.client.calls import _ActionClient
-from composer.client.session import Session
+from composer.client.session import Deadline, Session
 from composer.client.shared_session import InvalidHandle, SharedSession
 from tests.ros.support.in_process import Peer, wait_until
 
@@ -99,5 +99,5 @@ def test_an_action_client_may_end_when_the_executor_is_about_to_wait() -> None:
         client.destroy()
         session.node.add_waitable(client)
         with pytest.raises(InvalidHandle):
-            session._executor.spin_once(timeout_sec=0.0)
+            session.spin_once(Deadline(0.0))
         session.node.remove_waitable(client)

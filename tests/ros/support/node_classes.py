@@ -72,7 +72,7 @@ class Listener(Node):
         self.get_logger().info(f"got {message.data}", once=True)
 
     def on_number_with_info(self, message: Int64, info: Any) -> None:
-        self.infos.append((message.data, info["source_timestamp"]))
+        self.infos.append((message.data, info["publication_sequence_number"]))
 
     def on_count(self, _: Any, response: Any) -> Any:
         response.success = True

@@ -10,9 +10,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
@@ -23,6 +24,7 @@ from composer.runtime.children.child_processes import (
     Command,
     StartFailed,
 )
+from composer.runtime.executors.stacks import format_stack, stacks_of
 
 PATIENCE_S = 60.0
 MARK = "COMPOSER_TEST_MARK"
@@ -230,10 +232,14 @@ def test_a_launcher_that_was_killed_is_closed_without_an_error(children: ChildPr
     closer = threading.Thread(target=lambda: errors.append(closed(children)))
     errors: list[BaseException | None] = []
     closer.start()
-    wait_until(lambda: children._connection is None, "the begin of the end")
+    wait_until(lambda: ".join(" in "".join(map(format_stack, stacks(closer))), "its wait")
     closing.set()
     closer.join(PATIENCE_S)
     assert errors == [None]
+
+
+def stacks(thread: threading.Thread) -> Iterable[Sequence[FrameType]]:
+    return stacks_of(filter(None, [thread.ident])).values()
 
 
 def closed(children: ChildProcesses) -> BaseException | None:
