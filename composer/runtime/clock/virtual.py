@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable
 from math import inf
 from queue import SimpleQueue
-from threading import get_ident
+from threading import current_thread, get_ident, main_thread
 from typing import Final, TypeVar
 
 from composer.runtime.clock.clock import COMPUTER, Clock
@@ -27,6 +27,8 @@ _NANOSECONDS = 1_000_000_000
 STANDSTILL_READS: Final = 2_999
 #: How often a system that has nothing to wait for looks for signals and other threads.
 _POLL_S = 0.001
+#: How often the main thread looks for signals while it waits for its turn, in real time.
+_SIGNALS_S = 0.1
 #: How long a thread that is interrupted waits for its turn, in real time.
 _INTERRUPTED_WITHIN_S = 1.0
 
@@ -168,8 +170,12 @@ class VirtualClock(Clock):
     def _wait_for_turn(self, waiting: _Waiting) -> None:
         self._waiting.append(waiting)
         self._next().turn.release()
+        # A signal that arrives just before the wait for a lock does not end it, and Python calls
+        # handlers on the main thread only.
+        limit_s = _SIGNALS_S if current_thread() is main_thread() else -1
         try:
-            waiting.turn.acquire()
+            while not waiting.turn.acquire(timeout=limit_s):
+                pass
         except BaseException:
             # A signal handler has raised it, such as KeyboardInterrupt. Another thread has the turn
             # and passes it on, unless a callback does not return.

@@ -161,6 +161,27 @@ def _raise(*_: object) -> None:
     raise _Interrupted
 
 
+def test_a_signal_that_comes_just_before_the_main_thread_waits_is_handled() -> None:
+    """Here another thread receives it, which does not end the wait of the main thread either."""
+    clock = VirtualClock()
+    handled = threading.Event()
+    seen: list[bool] = []
+
+    def receive() -> None:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGUSR1])
+        signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
+        seen.append(handled.wait(10.0))
+
+    before = signal.signal(signal.SIGUSR1, lambda *_: handled.set())
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+    try:
+        run(clock, receive)
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGUSR1])
+        signal.signal(signal.SIGUSR1, before)
+    assert seen == [True]
+
+
 def test_an_interrupted_thread_keeps_the_order_of_turns() -> None:
     clock = VirtualClock()
     ended = threading.Event()
