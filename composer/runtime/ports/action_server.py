@@ -43,6 +43,7 @@ class RunningGoal:
         self._handle = handle
         self._publish_local = publish_local
         self._is_node_leaving = False
+        self.has_begun = False  # before its task, which another thread may run at once
         self.task: Future[Any] | None = None
         self.ended: Future[None] = Future()
 
@@ -228,7 +229,7 @@ class ActionServerPort(RunningPort):
 
     def _on_cancel_request(self, handle: ServerGoalHandle) -> CancelResponse:
         goal = self._goals.get(bytes(handle.goal_id.uuid))
-        if goal is not None and goal.task is None:
+        if goal is not None and not goal.has_begun:
             # It is waiting. rclpy sets its status to canceling after this call.
             self._context.loop.call_soon(lambda: self._end(goal, None, canceled=True))
         return CancelResponse.ACCEPT
@@ -238,6 +239,7 @@ class ActionServerPort(RunningPort):
     def _run(self, goal: RunningGoal) -> Coroutine[Any, Any, None] | None:
         if not goal.is_open:
             return None  # canceled while it waited
+        goal.has_begun = True
         goal.execute()
         steps = self._timer.wrap_steps(self._execute(goal))
         goal.task = self._context.spawn(self._context.strand.wrap(steps))

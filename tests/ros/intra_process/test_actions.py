@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import pytest
 from action_msgs.srv import CancelGoal
 from rclpy.action.server import ServerGoalHandle
 
+from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors import actions
-from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, running, wait_until
 
 TEXT = """
 system: going
@@ -136,6 +138,29 @@ def test_goals_have_the_same_outcomes_in_process_and_by_dds(
         wait_until(lambda: len(client.outcomes) == 6)
         assert client.outcomes[-1] == "CallCancelled"
         wait_until(lambda: server.turned_back > before, "the end of the unawaited goal")
+
+
+def test_a_goal_that_another_thread_runs_at_once_is_canceled_with_its_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spawn, may_go_on = NodeContext.spawn, threading.Event()
+
+    def spawn_and_pause(context: NodeContext, coroutine: Any) -> Any:
+        task = spawn(context, coroutine)
+        if context.loop.name == "own":
+            may_go_on.wait(PATIENCE_S)
+        return task
+
+    monkeypatch.setattr(NodeContext, "spawn", spawn_and_pause)
+    text = TEXT.replace("KIND", "multi_threaded").replace("DELIVERY", "auto")
+    with running(text, tmp_path, going=MODULE) as system:
+        client = go(system, 0.0)
+        wait_until(lambda: client.feedback and client.sent)
+        system.spawn("client", client.turn_back())
+        wait_until(lambda: system.behavior("server").turned_back)
+        may_go_on.set()
+        wait_until(lambda: client.outcomes)
+        assert client.outcomes == [("canceled", "turned back")]
 
 
 def count_goals() -> int:
