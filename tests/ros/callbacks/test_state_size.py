@@ -12,9 +12,9 @@ nodes:
   growing:
     state: {text: abcdefgh, list: [1, [2, 3]]}
     timers:
-      text: {period_ms: 1, set: {text: "{state.text}{state.text}"}}
-      list: {period_ms: 1, set: {list: ["{state.list}", "{state.list}"]}}
-      whole: {period_ms: 1, set: {text: "{state.text}"}, log: "length {len(state.text)}"}
+      text: {period_ms: 20, set: {text: "{state.text}{state.text}"}}
+      list: {period_ms: 20, set: {list: ["{state.list}", "{state.list}"]}}
+      whole: {period_ms: 20, set: {text: "{state.text}"}, log: "length {len(state.text)}"}
 """
 
 

@@ -16,10 +16,9 @@ import pytest
 from tests.ros.dashboard.test_foxglove_limits import raw
 from tests.ros.support.commands import COMPOSE, hand_written
 from tests.ros.support.dashboard import Address
+from tests.ros.support.in_process import end_limit_s
 from tests.ros.support.system_process import PATIENCE_S, RunningSystem
 
-#: On a busy machine; the limits in order are 5 s and more.
-AT_ONCE_S = 4.0
 #: Signals that follow more closely are those of a terminal and of a tool that forwards them.
 PAUSE_S = 0.2
 PIPE_BYTES = 4096
@@ -103,7 +102,7 @@ def end(process: subprocess.Popen[str]) -> str:
     process.send_signal(signal.SIGINT)
     sent_s = time.monotonic()
     _, errors = process.communicate(timeout=PATIENCE_S)
-    assert time.monotonic() - sent_s < AT_ONCE_S
+    assert time.monotonic() - sent_s < end_limit_s()
     assert "Traceback" not in errors
     return errors
 
@@ -139,7 +138,7 @@ def test_a_run_with_a_dashboard(tmp_path: Path) -> None:
         system.wait_for("deactivating")
         time.sleep(PAUSE_S)
         _, took_s = system.stop()
-        assert took_s < AT_ONCE_S
+        assert took_s < end_limit_s()
         assert "Traceback" not in system.output
         assert not [number for number in processes if Path(f"/proc/{number}").exists()]
 

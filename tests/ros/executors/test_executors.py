@@ -206,7 +206,7 @@ class TestStopping:
     def test_a_loop_that_never_started_stops(self, kind: ExecutorKind) -> None:
         rclpy.init()
         try:
-            assert loop_of(kind).stop(1.0)
+            assert loop_of(kind).stop(60.0)
         finally:
             rclpy.shutdown()
 

@@ -18,7 +18,7 @@ from tests.ros.support.commands import code_of_end
 pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 
 #: Without the second signal, it waits 20 s for hosts that do not answer.
-AT_ONCE_S = 8.0
+AT_ONCE_S = 15.0
 
 
 @contextmanager

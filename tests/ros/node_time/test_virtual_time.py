@@ -324,7 +324,7 @@ def test_what_virtual_time_does_not_control_is_named_once(tmp_path: Path) -> Non
 
 
 def test_external_nodes_take_part_in_a_system_that_publishes_its_clock(peer: Peer) -> None:
-    options = ("--time", "virtual", "--speed", "20", "--publish-clock")
+    options = ("--time", "virtual", "--speed", "2", "--publish-clock")
     with RunningSystem("systems/pipeline.yaml", *options) as system:
         times = peer.listen(Clock, "/clock", qos_profile_sensor_data)
         commands = peer.listen(Twist, "/motor_commands")

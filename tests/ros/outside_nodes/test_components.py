@@ -14,9 +14,10 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
+from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import NodeFailed
 from tests.ros.support.commands import output_of
-from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
+from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, running, wait_until
 
 pytest.importorskip("composition_interfaces", reason="make test builds it")
 from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
@@ -171,7 +172,8 @@ def test_a_container_may_be_slow_with_more_components_than_its_services_queue(
     names = [f"talker_{number:02}" for number in range(14)]
     slow = TALKER.replace("demo::Talker", "demo::Slow\n      ready_timeout_ms: 60000")
     nodes = [slow.replace("  talker:", f"  {name}:") for name in names]
-    with running(robot(*nodes), tmp_path) as system:
+    options = HostOptions(stop_within_s=PATIENCE_S)
+    with running(robot(*nodes), tmp_path, options=options) as system:
         assert not system.reported(NodeFailed)
         assert sorted(loaded(peer)) == [f"/robot/left/{name}" for name in names]
         assert system.stop().exit_code == 0

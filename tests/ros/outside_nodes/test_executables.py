@@ -211,15 +211,15 @@ nodes:
     [
         ("{command: [sh, -c, exit 3]}", "", "activate failed: its process exited with status 3"),
         (
-            f"{{command: {DRIVER}, ready_timeout_ms: 1500}}",
+            f"{{command: {DRIVER}, ready_timeout_ms: 8000}}",
             "publishers: {other: {type: std_msgs/msg/String, external: true}}",
-            "activate failed: it has no publisher /other after 1.5 s",
+            "activate failed: it has no publisher /other after 8 s",
         ),
         (  # a program that names its node itself, as a launch file would
             f"{{command: [sh, -c, '{sys.executable} {PROGRAMS / 'driver.py'} --ros-args"
-            " -r __node:=c -r __ns:=/a/b $@; true', sh], ready_timeout_ms: 3000}",
+            " -r __node:=c -r __ns:=/a/b $@; true', sh], ready_timeout_ms: 8000}",
             "",
-            "graph after 3 s; there is /a/b/c instead: write 'name: c' and 'namespace: /a/b'",
+            "graph after 8 s; there is /a/b/c instead: write 'name: c' and 'namespace: /a/b'",
         ),
         ("{command: [/nowhere/x]}", "", "configure failed: there is no program '/nowhere/x'"),
         (

@@ -72,15 +72,18 @@ def test_stamps_have_the_time_of_the_run() -> None:
     assert stamps == [(8, 100_000_000), (0, 0)]
 
 
+def with_a_damaged_chunk(data: bytes) -> bytes:
+    """Return a bag with zeros in the middle of its first chunk: in the data of messages."""
+    at = 8  # after the magic bytes there are records: an operation, a length and so many bytes
+    while data[at] != 6:
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    middle = at + int.from_bytes(data[at + 1 : at + 9], "little") // 2
+    return data[:middle] + bytes(100) + data[middle + 100 :]
+
+
 @pytest.mark.parametrize(
     ("damage", "text"),
-    [
-        (lambda _: b"", "is empty"),
-        (
-            lambda data: data[: len(data) // 4] + bytes(500) + data[len(data) // 4 + 500 :],
-            "is corrupt or not supported",
-        ),
-    ],
+    [(lambda _: b"", "is empty"), (with_a_damaged_chunk, "is corrupt or not supported")],
 )
 def test_a_damaged_bag_fails_the_step(
     damage: Callable[[bytes], bytes], text: str, recorded: Path

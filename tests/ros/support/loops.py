@@ -84,7 +84,7 @@ def bench(kind: ExecutorKind, name: str = "bench") -> Iterator[Bench]:
             yield Bench(loop, node, reports)
         finally:
             loop.remove_node(node)
-            stopped = loop.stop(5.0)
+            stopped = loop.stop(60.0)
             leave(node)
         assert stopped, "the loop did not stop"
     finally:
