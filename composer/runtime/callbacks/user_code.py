@@ -9,7 +9,7 @@ from composer.behavior import CallCancelled, Logger
 from composer.runtime.executors.exceptions import is_closing, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
-from composer.runtime.executors.strand import Strand
+from composer.runtime.executors.strand import OuterCoroutine, Strand
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 
 T = TypeVar("T")
@@ -73,7 +73,10 @@ class UserCode:
 
     def continuation(self, name: str, result: object) -> Coroutine[Any, Any, None] | None:
         """Return a coroutine that awaits a result of user code, or None if it is not awaitable."""
-        return self._continue(name, result) if isinstance(result, Awaitable) else None
+        if not isinstance(result, Awaitable):
+            return None
+        rest = self._continue(name, result)
+        return OuterCoroutine(rest, result) if isinstance(result, Coroutine) else rest
 
     @calls_user_code
     async def _continue(self, name: str, result: Awaitable[Any]) -> None:

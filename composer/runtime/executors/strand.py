@@ -127,12 +127,12 @@ class StepScope(Protocol):
 
 def in_steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
     """Return a coroutine that runs each step of ``coroutine``, up to its next wait, in scope."""
-    return _Scoped(coroutine, _steps(scope, coroutine))
+    return OuterCoroutine(_steps(scope, coroutine), coroutine)
 
 
 def as_a_whole(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
     """Return a coroutine that runs ``coroutine`` in scope from its start to its end."""
-    return _Scoped(coroutine, _whole(scope, coroutine))
+    return OuterCoroutine(_whole(scope, coroutine), coroutine)
 
 
 class ExclusiveStrand(SerialStrand):
@@ -143,33 +143,45 @@ class ExclusiveStrand(SerialStrand):
         return as_a_whole(self, coroutine)
 
 
-class _Scoped(Coroutine[Any, Any, T]):
-    """Closes the inner coroutine too if it is closed before it has begun.
+class OuterCoroutine(Coroutine[Any, Any, T]):
+    """A coroutine that awaits an inner one, and closes it too if it is closed before it has begun.
 
     Otherwise Python would warn that the inner coroutine was never awaited.
     """
 
-    __slots__ = ("_inner", "_steps")
+    __slots__ = ("_inner", "_outer")
 
-    def __init__(self, inner: Coroutine[Any, Any, T], steps: Generator[Any, Any, T]) -> None:
+    def __init__(
+        self,
+        outer: Coroutine[Any, Any, T] | Generator[Any, Any, T],
+        inner: Coroutine[Any, Any, Any],
+    ) -> None:
+        self._outer = outer
         self._inner = inner
-        self._steps = steps
+
+    @property
+    def cr_await(self) -> object:
+        """What it awaits, as of other coroutines."""
+        return self._outer
 
     def __await__(self) -> Generator[Any, Any, T]:
-        return self._steps
+        return self._outer if isinstance(self._outer, Generator) else self._outer.__await__()
 
     def send(self, value: Any) -> Any:
-        return self._steps.send(value)
+        """Run the next step."""
+        return self._outer.send(value)
 
     def throw(self, *raised: Any) -> Any:
+        """Run the next step, which begins with an exception."""
         try:
-            return self._steps.throw(*raised)
+            return self._outer.throw(*raised)
         except BaseException:
             self._inner.close()
             raise
 
     def close(self) -> None:
-        self._steps.close()
+        """End both."""
+        self._outer.close()
         self._inner.close()
 
 

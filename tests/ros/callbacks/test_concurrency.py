@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import gc
+import warnings
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from std_msgs.msg import Int64
 
+from composer.runtime.callbacks.callback import CallbackTimer
+from composer.runtime.callbacks.user_code import UserCode
+from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.executors.strand import ExclusiveStrand
+from composer.runtime.metrics.statistics import CallbackStatistics
 from tests.ros.support.in_process import Peer, running
 
 SLOW = """
@@ -216,3 +225,24 @@ def test_the_callbacks_of_a_node_run_one_at_a_time_on_several_threads(
             source.publish(Int64(data=number))
         line = system.wait_for_log("at once")
     assert line == "at most 1 at once"
+
+
+def test_python_does_not_warn_of_a_handler_that_is_canceled_before_it_begins() -> None:
+    """It waits for its turn when the node is cleaned up."""
+
+    async def handler() -> None:
+        raise AssertionError("it does not begin")
+
+    loop: Any = SimpleNamespace(clock=COMPUTER, call_soon=None, is_parallel=False)
+    context: Any = SimpleNamespace(
+        loop=loop, mutations=None, log=None, statistics=SimpleNamespace(tracing=True)
+    )
+    timer = CallbackTimer(context, CallbackStatistics("timer", "tick"), None)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        rest = timer.finish(0.0, UserCode().continuation("on_tick", handler()))
+        assert rest is not None
+        ExclusiveStrand(loop).wrap(rest).close()
+        del rest
+        gc.collect()
+    assert not caught
