@@ -34,7 +34,7 @@ class VirtualLoop(BaseLoop):
         self, clock: VirtualClock, on_exception: Callable[[str, BaseException], None]
     ) -> None:
         self._ready: deque[Callable[[], object]] = deque()
-        self._timers = TimerQueue(clock)
+        self._timers = TimerQueue[ScheduledCall](clock.monotonic, has_ticks=clock.has_ticks)
         self._clock = clock
         #: Raised by :meth:`run_until` as soon as there is one.
         self.errors: deque[BaseException] = deque()

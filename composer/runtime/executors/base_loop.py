@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable, Coroutine
 from math import floor, inf, isnan
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from composer.runtime.clock.clock import Clock
 from composer.runtime.executors.futures import Future, done_event
@@ -20,19 +20,29 @@ _SWEEP_SIZE = 64  # entries at which canceled calls are removed
 
 
 class ScheduledCall:
-    """A call that is due at ``due_s``, and each ``period_s`` seconds after that if it has one."""
+    """A call that is due at ``due_s``, and each ``period_s`` seconds after that if it has one.
 
-    __slots__ = ("_clock", "callback", "cancelled", "due_s", "period_s")
+    ``monotonic()`` returns the time that it follows.
+    """
+
+    __slots__ = ("_monotonic", "callback", "cancelled", "due_s", "period_s")
+
+    #: How many units of its times are a second.
+    per_s = 1
 
     def __init__(
-        self, clock: Clock, due_s: float, period_s: float | None, callback: Callable[[], object]
+        self,
+        monotonic: Callable[[], float],
+        due_s: float,
+        period_s: float | None,
+        callback: Callable[[], object],
     ) -> None:
         """Raise ValueError for a period that is not positive and a time that is NaN."""
         if period_s is not None and not period_s > 0:
-            raise ValueError(f"a period must be positive, not {period_s:g} s")
+            raise ValueError(f"a period must be positive, not {period_s / self.per_s:g} s")
         if isnan(due_s):
             raise ValueError("a delay must be a number")
-        self._clock = clock
+        self._monotonic = monotonic
         self.due_s = due_s
         self.period_s = inf if period_s is None else period_s
         self.callback = callback
@@ -41,29 +51,33 @@ class ScheduledCall:
     @property
     def late_s(self) -> float:
         """How long ago the call was due, in seconds."""
-        return self._clock.monotonic() - self.due_s
+        return (self._monotonic() - self.due_s) / self.per_s
 
     def cancel(self) -> None:
         """Never call again."""
         self.cancelled = True
 
 
-class TimerQueue:
+C = TypeVar("C", bound=ScheduledCall)
+
+
+class TimerQueue(Generic[C]):
     """Scheduled calls, for use by one thread.
 
     A sorted list with the next call last, not a heap: taking that call and, if there are few,
     inserting it again needs no search. A periodic call is inserted again each time.
     """
 
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._has_ticks = clock.has_ticks
-        self._entries: list[tuple[float, int, ScheduledCall]] = []  # ascending: -due_s, -order
+    def __init__(self, monotonic: Callable[[], float], *, has_ticks: bool = False) -> None:
+        """``has_ticks`` is as for :class:`.Clock`."""
+        self._monotonic = monotonic
+        self._has_ticks = has_ticks
+        self._entries: list[tuple[float, int, C]] = []  # ascending: -due_s, -order
         self._order = itertools.count(0, -1)  # calls due at the same time keep their order
         self._sweep_at = _SWEEP_SIZE
         self.next_s = inf  # no call is due before; the call may be canceled
 
-    def add(self, call: ScheduledCall) -> None:
+    def add(self, call: C) -> None:
         """Add a call."""
         self._insert(call)
         self.next_s = min(self.next_s, -self._entries[-1][0])
@@ -76,7 +90,7 @@ class TimerQueue:
         self.next_s = -entries[-1][0] if entries else inf
         return self.next_s
 
-    def pop(self) -> ScheduledCall:
+    def pop(self) -> C:
         """Remove and return the next call, even a canceled one. Raises IndexError if empty.
 
         Until :meth:`reschedule`, ``next_s`` includes the next time of a periodic call.
@@ -88,7 +102,7 @@ class TimerQueue:
             self.next_s = -entries[-1][0]
         return call
 
-    def reschedule(self, call: ScheduledCall) -> None:
+    def reschedule(self, call: C) -> None:
         """Add a periodic call again for the next multiple of its period in the future.
 
         A late call does not shift the next one; missed periods are skipped.
@@ -96,7 +110,7 @@ class TimerQueue:
         period_s = call.period_s
         if period_s != inf and not call.cancelled:
             due_s = call.due_s + period_s
-            late_s = self._clock.monotonic() - due_s
+            late_s = self._monotonic() - due_s
             if late_s >= 0.0:
                 due_s += (floor(late_s / period_s) + 1) * period_s
             call.due_s = due_s
@@ -104,7 +118,15 @@ class TimerQueue:
         entries = self._entries
         self.next_s = -entries[-1][0] if entries else inf
 
-    def _insert(self, call: ScheduledCall) -> None:
+    def move(self, due: Callable[[C], float]) -> None:
+        """Let each call be due at ``due(call)``, as after a jump of the time."""
+        calls = [call for _, _, call in reversed(self._entries)]
+        self._entries.clear()
+        for call in calls:
+            call.due_s = due(call)
+            self._insert(call)
+
+    def _insert(self, call: C) -> None:
         entries = self._entries
         if len(entries) >= self._sweep_at:
             self._sweep()
@@ -117,7 +139,7 @@ class TimerQueue:
 
     def _tick(self, due_s: float) -> float:
         """Return a time in whole nanoseconds, which is not over if ``due_s`` is not."""
-        now_s = self._clock.monotonic()
+        now_s = self._monotonic()
         if due_s <= now_s:
             return due_s
         tick_s = round(due_s, 9)
@@ -180,16 +202,17 @@ class BaseLoop(ABC):
     def call_later(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` once, ``delay_s`` seconds from now."""
         # Never before now: all calls due at one time are made before anything else.
-        due_s = self.clock.monotonic() + max(delay_s, 0.0)
-        return self._schedule(ScheduledCall(self.clock, due_s, None, callback))
+        monotonic = self.clock.monotonic
+        due_s = monotonic() + max(delay_s, 0.0)
+        return self._schedule(ScheduledCall(monotonic, due_s, None, callback))
 
     def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` each ``period_s`` seconds; a late call does not shift the next.
 
         Raises ValueError for a period that is not positive.
         """
-        due_s = self.clock.monotonic() + period_s
-        return self._schedule(ScheduledCall(self.clock, due_s, period_s, callback))
+        monotonic = self.clock.monotonic
+        return self._schedule(ScheduledCall(monotonic, monotonic() + period_s, period_s, callback))
 
     def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
         """Run a coroutine; return the future of its result.

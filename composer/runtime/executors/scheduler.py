@@ -39,7 +39,7 @@ class Scheduler(TurnTaking):
     ) -> None:
         super().__init__(name, on_exception, kind, threads, clock)
         self._poller = poller_for(clock)
-        self._timers = TimerQueue(clock)
+        self._timers = TimerQueue[ScheduledCall](clock.monotonic, has_ticks=clock.has_ticks)
         self._calls: deque[Callable[[], object]] = deque()
         self._ready: deque[SourceGroup] = deque()  # with something to take
         self._groups: dict[int, SourceGroup] = {}  # by the file descriptor of their signal

@@ -23,54 +23,33 @@ from rclpy.time import Time
 from rclpy.time_source import CLOCK_TOPIC
 from rosgraph_msgs.msg import Clock as ClockMessage
 
+from composer.runtime.executors.base_loop import ScheduledCall, TimerQueue
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 NANOSECONDS = 1_000_000_000
-_NEVER = math.inf
 
 
-class SimTimer:
-    """A call that is due ``delay_ns`` after its creation, and periodically if ``repeats``."""
+class SimTimer(ScheduledCall):
+    """A call of :class:`SimTimers`; its times are in nanoseconds."""
 
-    __slots__ = ("_timers", "callback", "cancelled", "delay_ns", "due_ns", "repeats")
+    __slots__ = ("delay_ns",)
+
+    per_s = NANOSECONDS
 
     def __init__(
-        self,
-        timers: SimTimers,
-        delay_s: float,
-        callback: Callable[[], object],
-        *,
-        repeats: bool,
+        self, timers: SimTimers, delay_ns: float, callback: Callable[[], object], *, repeats: bool
     ) -> None:
         """Raise ValueError for a period that is not positive and a delay that is NaN."""
-        if repeats and not delay_s > 0:
-            raise ValueError(f"a period must be positive, not {delay_s:g} s")
-        if math.isnan(delay_s):
-            raise ValueError("a delay must be a number")
-        self._timers = timers
-        self.delay_ns: float = (
-            max(round(delay_s * NANOSECONDS), int(repeats)) if math.isfinite(delay_s) else delay_s
+        super().__init__(
+            lambda: timers.now_ns, timers.now_ns + delay_ns, delay_ns if repeats else None, callback
         )
-        self.due_ns: float = 0
-        self.callback = callback
-        self.repeats = repeats
-        self.cancelled = False
-
-    @property
-    def late_s(self) -> float:
-        """How long ago the call was due, in seconds of the simulation."""
-        return (self._timers.now_ns - self.due_ns) / NANOSECONDS
-
-    def cancel(self) -> None:
-        """Never call again."""
-        self.cancelled = True
-        self._timers.discard(self)
+        self.delay_ns = delay_ns
 
 
 class SimTimers:
-    """The timers of one node; few, so that no heap is needed. From any thread.
+    """The timers of one node, and the time that they count. From any thread.
 
     Time advances only by :meth:`set_time`. When it jumps:
 
@@ -84,79 +63,51 @@ class SimTimers:
         """Make the calls on ``loop``."""
         self._loop = loop
         self._changing = threading.Lock()
-        self._waiting: set[SimTimer] = set()
-        self._next_ns: float = _NEVER
+        self._waiting = TimerQueue[SimTimer](lambda: self.now_ns)
         self.now_ns = 0
 
     def add(
         self, delay_s: float, callback: Callable[[], object], *, repeats: bool = False
     ) -> SimTimer:
-        """Call ``callback`` ``delay_s`` seconds of the simulation from now."""
-        timer = SimTimer(self, delay_s, callback, repeats=repeats)
-        if timer.delay_ns <= 0:
-            self._loop.call_soon(partial(self._call, timer))
-            return timer
-        with self._changing:
-            self._wait_for(timer, self.now_ns + timer.delay_ns)
-        return timer
+        """Call ``callback`` ``delay_s`` seconds of the simulation from now.
 
-    def discard(self, timer: SimTimer) -> None:
-        """Stop waiting for a timer."""
+        Raises ValueError for a period that is not positive and a delay that is NaN.
+        """
+        delay_ns = delay_s
+        if math.isfinite(delay_s):
+            delay_ns = round(delay_s * NANOSECONDS) or int(repeats and delay_s > 0)
         with self._changing:
-            self._waiting.discard(timer)
+            timer = SimTimer(self, delay_ns, callback, repeats=repeats)
+            if delay_ns > 0:
+                self._waiting.add(timer)
+                return timer
+        self._loop.call_soon(partial(self._call, timer))
+        return timer
 
     def set_time(self, now_ns: int) -> None:
         """Advance to ``now_ns`` and make all calls that are due."""
+        waiting = self._waiting
+        due: list[SimTimer] = []
         with self._changing:
             before_ns, self.now_ns = self.now_ns, now_ns
             if before_ns == 0:
-                self._reschedule(lambda timer: now_ns + timer.delay_ns)
+                waiting.move(lambda timer: now_ns + timer.delay_ns)
             elif now_ns < before_ns:
-                self._reschedule(lambda timer: min(timer.due_ns, now_ns + timer.delay_ns))
-            due = self._pop_due() if now_ns >= self._next_ns else ()
+                waiting.move(lambda timer: min(timer.due_s, now_ns + timer.delay_ns))
+            while waiting.next_due_s() <= now_ns:
+                due.append(waiting.pop())
         for timer in due:
             self._loop.call_soon(partial(self._call, timer))
 
-    def _wait_for(self, timer: SimTimer, due_ns: float) -> None:
-        timer.due_ns = due_ns
-        self._waiting.add(timer)
-        self._next_ns = min(self._next_ns, due_ns)
-
-    def _reschedule(self, due_ns: Callable[[SimTimer], float]) -> None:
-        self._next_ns = _NEVER
-        for timer in self._waiting:
-            self._wait_for(timer, due_ns(timer))
-
-    def _pop_due(self) -> list[SimTimer]:
-        now_ns = self.now_ns
-        due = sorted(
-            (timer for timer in self._waiting if timer.due_ns <= now_ns),
-            key=lambda timer: timer.due_ns,
-        )
-        self._waiting.difference_update(due)
-        self._next_ns = min((timer.due_ns for timer in self._waiting), default=_NEVER)
-        return due
-
     def _call(self, timer: SimTimer) -> None:
-        if timer.cancelled:
-            return
         try:
-            timer.callback()
+            if not timer.cancelled:
+                timer.callback()
         finally:
-            if timer.repeats:
-                self._repeat(timer)
-
-    def _repeat(self, timer: SimTimer) -> None:
-        """Wait for the next multiple of the period in the future."""
-        with self._changing:
-            if timer.cancelled:
-                return
-            late_ns = self.now_ns - timer.due_ns
-            if late_ns < 0:  # time has jumped back since it was due
-                self._wait_for(timer, self.now_ns + timer.delay_ns)
-            else:
-                periods = late_ns // timer.delay_ns + 1
-                self._wait_for(timer, timer.due_ns + periods * timer.delay_ns)
+            with self._changing:
+                # The time may have jumped back since it was due.
+                timer.due_s = min(timer.due_s, self.now_ns)
+                self._waiting.reschedule(timer)
 
 
 #: As rclpy and rclcpp subscribe: only the latest time matters.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
@@ -115,9 +116,10 @@ def test_calls_come_in_the_order_they_are_due(bench: Bench) -> None:
     bench.pass_to(1.0)
     order: list[str] = []
     bench.calls.add(0.3, lambda: order.append("later"))
-    bench.calls.add(0.1, lambda: order.append("sooner"))
+    for name in "abcde":
+        bench.calls.add(0.1, partial(order.append, name))
     bench.pass_to(2.0)
-    assert order == ["sooner", "later"]
+    assert order == [*"abcde", "later"]
 
 
 @pytest.mark.parametrize("repeats", [True, False])

@@ -13,10 +13,10 @@ from composer.runtime.executors.base_loop import ScheduledCall, TimerQueue
 
 
 def call(due_s: float, period_s: float | None = None) -> ScheduledCall:
-    return ScheduledCall(COMPUTER, due_s, period_s, lambda: None)
+    return ScheduledCall(COMPUTER.monotonic, due_s, period_s, lambda: None)
 
 
-def take_due(queue: TimerQueue) -> list[ScheduledCall]:
+def take_due(queue: TimerQueue[ScheduledCall]) -> list[ScheduledCall]:
     taken = []
     while queue.next_due_s() <= monotonic():
         taken.append(queue.pop())
@@ -24,7 +24,7 @@ def take_due(queue: TimerQueue) -> list[ScheduledCall]:
 
 
 def test_pops_due_calls_in_order_and_keeps_the_rest() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     now_s = monotonic()
     late, soon, later = call(now_s - 2.0), call(now_s - 1.0), call(now_s + 60.0)
     for item in (later, soon, late):
@@ -36,7 +36,7 @@ def test_pops_due_calls_in_order_and_keeps_the_rest() -> None:
 
 
 def test_calls_due_at_the_same_time_keep_their_order() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     due_s = monotonic() - 1.0
     calls = [call(due_s) for _ in range(10)]
     for item in calls:
@@ -45,13 +45,13 @@ def test_calls_due_at_the_same_time_keep_their_order() -> None:
 
 
 def test_an_empty_queue_is_never_due() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     assert queue.next_due_s() == queue.next_s == math.inf
     assert take_due(queue) == []
 
 
 def test_a_canceled_call_is_neither_made_nor_waited_for() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     now_s = monotonic()
     due, next_one, last = call(now_s - 1.0), call(now_s + 30.0), call(now_s + 60.0)
     for item in (due, next_one, last):
@@ -68,7 +68,7 @@ def test_canceled_calls_do_not_accumulate() -> None:
         gc.collect()
         return sum(type(item) is ScheduledCall for item in gc.get_objects())
 
-    queue, before = TimerQueue(COMPUTER), count()
+    queue, before = TimerQueue[ScheduledCall](COMPUTER.monotonic), count()
     for _ in range(10_000):
         item = call(monotonic() + 60.0)
         queue.add(item)
@@ -77,7 +77,7 @@ def test_canceled_calls_do_not_accumulate() -> None:
 
 
 def test_a_periodic_call_keeps_its_phase_and_skips_missed_periods() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     begin_s = monotonic() - 350.0
     item = call(begin_s, period_s=100.0)
     queue.reschedule(item)  # called 3.5 periods late
@@ -86,7 +86,7 @@ def test_a_periodic_call_keeps_its_phase_and_skips_missed_periods() -> None:
 
 
 def test_a_periodic_call_in_time_is_due_one_period_later() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     due_s = monotonic()
     item = call(due_s, period_s=60.0)
     queue.reschedule(item)
@@ -94,7 +94,7 @@ def test_a_periodic_call_in_time_is_due_one_period_later() -> None:
 
 
 def test_a_popped_call_counts_for_the_next_due_time() -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     begin_s = monotonic() - 1.0
     once, often = call(begin_s), call(begin_s + 0.5, period_s=60.0)
     queue.add(once)
@@ -109,7 +109,7 @@ def test_a_popped_call_counts_for_the_next_due_time() -> None:
 
 @pytest.mark.parametrize("period_s", [None, 1.0])
 def test_canceled_and_single_calls_are_not_repeated(period_s: float | None) -> None:
-    queue = TimerQueue(COMPUTER)
+    queue = TimerQueue[ScheduledCall](COMPUTER.monotonic)
     item = call(monotonic(), period_s)
     if period_s is not None:
         item.cancel()
