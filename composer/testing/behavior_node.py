@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import replace
-from math import inf
 from typing import Any, cast
 
 from composer.behavior import BehaviorError, TransitionFailed
@@ -21,6 +20,7 @@ from composer.runtime.node.behavior_loader import (
     named_ports,
 )
 from composer.runtime.ports import PortSet, RunningPort
+from composer.runtime.ports.goals import Handlers
 from composer.runtime.ports.timer import TimerPort
 from composer.testing.behavior_context import TestContext
 from composer.testing.behavior_ports import ClientPort, PublisherPort, ServicePort, SubscriptionPort
@@ -229,12 +229,10 @@ class TestNode:
             case PortKind.SUBSCRIPTION:
                 return SubscriptionPort(context, port, self._on_message(port, handler))
             case PortKind.SERVICE:
-                respond = handler or (lambda _, response: response)
-                return ServicePort(context, name, interface, respond, reentrant=port.reentrant)
+                return ServicePort(context, port, interface, handler)
             case PortKind.ACTION_SERVER:
-                execute, accept = handler or (lambda _: None), method(behavior, f"accept_{name}")
-                limit = None if port.reentrant else port.qos.profile.queue_depth or inf
-                return ActionServerPort(context, name, interface, (execute, accept), limit)
+                handlers = Handlers(handler, method(behavior, f"accept_{name}"))
+                return ActionServerPort(context, port, interface, handlers)
             case _:
                 client = ClientPort(context, port, interface)
                 if name in self.servers:

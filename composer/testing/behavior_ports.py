@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Callable, Coroutine
 from functools import partial
 from math import inf
 from typing import Any, TypeVar
 
-from composer.behavior import CallCancelled, CallError, CallTimeout, ServerUnavailable
+from composer.behavior import CallCancelled, CallTimeout, ServerUnavailable
 from composer.model import Port
 from composer.model.qos import Durability
-from composer.runtime.executors.exceptions import describe, is_closing, shown
-from composer.runtime.executors.futures import Cancelled, Future, wrap_future
+from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.ports import RunningPort
+from composer.runtime.ports.serving import RequestServer
 from composer.testing.behavior_context import TestContext
 from composer.testing.goals import ActionServerPort, Outcome, ServedGoal
 
@@ -76,78 +76,28 @@ class SubscriptionPort(RunningPort):
         self._queue.clear()
 
 
-class ServicePort(RunningPort):
+class ServicePort(RequestServer):
     """Answers requests by a handler: of a behavior, or of the test for a client of the behavior."""
-
-    def __init__(
-        self,
-        context: TestContext,
-        name: str,
-        service_type: Any,
-        handler: Callable[[Any, Any], Any],
-        *,
-        reentrant: bool = False,
-    ) -> None:
-        self._context = context
-        self._name = name
-        self._type = service_type
-        self._handler = handler
-        self._queue = context.queue(self._answer, reentrant=reentrant)
-        self._pending: set[Future[Any]] = set()
 
     def call(self, request: Any) -> Future[Any]:
         """Return the future of the response. It fails as a call in the process does."""
         answer: Future[Any] = Future()
-        self._pending.add(answer)
-        answer.add_done_callback(self._pending.discard)
-        if self._context.gate.incoming:
-            self._queue.put((request, answer))
-        else:
-            self._refuse(answer)
+        self.on_request(request, _Reply(answer))
         return answer
 
-    def deactivate(self) -> None:
-        """Refuse the requests that wait."""
-        for _, answer in self._queue.clear():
-            self._refuse(answer)
 
-    def destroy(self) -> None:
-        """Refuse the pending requests."""
-        for answer in tuple(self._pending):
-            self._refuse(answer)
+class _Reply:
+    """Ends one request of the test or of the behavior."""
 
-    async def _answer(self, item: tuple[Any, Future[Any]]) -> None:
-        request, answer = item
-        name = f"on_{self._name}"
-        try:
-            response = self._handler(request, self._type.Response())
-            if isinstance(response, Awaitable):
-                response = await response
-            self._check(response)
-            answer.set_result(response)
-        except BaseException as error:
-            if isinstance(error, Cancelled) or is_closing(error):
-                self._refuse(answer)
-                raise
-            self._fail(answer, f"{name}: {describe(error)}")
-            self._context.on_exception(name, error)
+    def __init__(self, answer: Future[Any]) -> None:
+        self._answer = answer
 
-    def _check(self, response: Any) -> None:
-        if not isinstance(response, self._type.Response):
-            kind = f"{self._type.__name__}.Response"
-            raise TypeError(f"on_{self._name} returned {shown(response)}, not a {kind}")
+    def __call__(self, response: Any) -> None:
+        self._answer.set_result(response)
 
-    def _refuse(self, answer: Future[Any]) -> None:
-        self._fail(answer, self._context.gate.refusal, ServerUnavailable)
-
-    def _fail(self, answer: Future[Any], reason: str, kind: type[CallError] = CallError) -> None:
-        response = self._type.Response()
-        if isinstance(getattr(response, "success", None), bool):
-            if isinstance(getattr(response, "message", None), str):
-                response.message = reason
-            answer.set_result(response)
-        else:
-            answer.set_exception(kind(f"service '{self._name}': {reason}"))
+    def refuse(self, error: BaseException) -> None:
+        """Send no response."""
+        self._answer.set_exception(error)
 
 
 class ClientPort(RunningPort):

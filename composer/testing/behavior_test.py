@@ -29,6 +29,7 @@ from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
+from composer.runtime.ports.goals import Handlers
 from composer.testing.behavior_context import TestContext, VirtualLoop
 from composer.testing.behavior_node import TestNode
 from composer.testing.behavior_ports import ServicePort
@@ -238,11 +239,12 @@ class BehaviorTest:
         log = _Log(lambda _, text: self._note(f"the server of '{port}': {text}"))
         context = replace(self._context, gate=gate, log=cast(Logger, log))
         interface = self._messages.interface(declared.interface.value)
+        served = replace(declared, reentrant=True)
         if declared.kind is PortKind.CLIENT:
-            server: Any = ServicePort(context, port, interface, respond, reentrant=True)
+            server: Any = ServicePort(context, served, interface, respond)
         else:
             accepts = accept if callable(accept) else lambda _: accept
-            server = ActionServerPort(context, port, interface, (respond, accepts), None)
+            server = ActionServerPort(context, served, interface, Handlers(respond, accepts))
             server.make_feedback = partial(self._content, declared, "feedback")
         self._node.set_server(port, server)
         self._settle()
@@ -318,6 +320,10 @@ class BehaviorTest:
         self._context.log.error(f"{callback}: {describe(error)}")
         if self._raises:
             self._loop.errors.append(error)
+
+    def error(self, callback: str, text: str) -> None:
+        """Log a wrong result of a handler; the current method of the test raises it."""
+        self.exception(callback, TypeError(f"{callback} {text}"))
 
     def _note(self, text: str) -> None:
         self._timeline.add(self.now_s, lambda: text)

@@ -10,13 +10,18 @@ from composer.runtime.executors.exceptions import is_closing, text_of
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import OuterCoroutine, Strand
+from composer.runtime.executors.tasks import SupportsCallLater
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
+from composer.runtime.metrics.statistics import Statistics
 
 T = TypeVar("T")
 
 
-class TaskLoop(Protocol):
+class TaskLoop(SupportsCallLater, Protocol):
     """The part of a loop that user code needs."""
+
+    def call_soon(self, callback: Callable[[], object]) -> None:
+        """Call ``callback`` as soon as the loop is free."""
 
     def overlap(self) -> None:
         """Let other threads serve the loop while a callback runs, if it is parallel."""
@@ -31,6 +36,9 @@ class Faults(Protocol):
     def exception(self, callback: str, error: BaseException) -> None:
         """Receive an exception of ``callback``."""
 
+    def error(self, callback: str, text: str) -> None:
+        """Receive another error of ``callback``, such as a wrong result."""
+
 
 class UserCode:
     """Calls user code and runs its coroutines. A base class; the attributes are a subclass's."""
@@ -42,6 +50,8 @@ class UserCode:
     strand: Strand
     log: Logger
     error_log: Faults
+    statistics: Statistics
+    names: dict[str, Any]
     tasks: set[Future[Any]]
 
     def spawn(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:

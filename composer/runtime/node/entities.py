@@ -17,8 +17,9 @@ from composer.runtime.node.behavior_loader import method
 from composer.runtime.node.transforms import Broadcasts, NodeTransforms
 from composer.runtime.ports import PortSet, RunningPort
 from composer.runtime.ports.action_client import ActionClientPort
-from composer.runtime.ports.action_server import ActionServerPort, Handlers
+from composer.runtime.ports.action_server import ActionServerPort
 from composer.runtime.ports.client import ClientPort
+from composer.runtime.ports.goals import Handlers
 from composer.runtime.ports.service import ServicePort
 from composer.runtime.ports.timer import TimerPort
 from composer.runtime.ports.topics import PublisherPort, SubscriptionPort

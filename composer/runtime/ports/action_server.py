@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -10,21 +10,17 @@ from rclpy.action.server import CancelResponse, GoalEvent, GoalResponse, ServerG
 from rclpy.serialization import serialize_message
 from unique_identifier_msgs.msg import UUID
 
-from composer.base.fast_dataclass import dataclass
-from composer.behavior import CallCancelled
 from composer.model import FeedbackSteps, Port
 from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.actions import GoalServer
-from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
-from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.stacks import calls_user_code
-from composer.runtime.executors.tasks import sleep, wait_for
+from composer.runtime.executors.exceptions import describe
+from composer.runtime.executors.futures import Future
+from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.servers import LocalActionServer
 from composer.runtime.intra_process.taps import GoalTap
-from composer.runtime.ports import RunningPort
+from composer.runtime.ports.goals import GoalExecutor, Handlers
 from composer.runtime.ros.messages import Build, compile_message, interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
@@ -102,47 +98,25 @@ class RunningGoal:
         self._handle.canceled()
 
 
-#: Maximum time for handlers to end their goals once the node leaves *active*.
-CANCEL_LIMIT_S = 1.0
+class ActionServerPort(GoalExecutor[RunningGoal]):
+    """Executes the goals of an action server of rclpy."""
 
-
-@dataclass(frozen=True, slots=True)
-class Handlers:
-    """A behavior's handlers of an action server: ``on_<port>`` and ``accept_<port>``."""
-
-    execute: Callable[[RunningGoal], Any] | None = None
-    accept: Callable[[Any], Any] | None = None
-
-
-class ActionServerPort(RunningPort):
-    """Executes goals while the node is active, one at a time unless the port is reentrant.
-
-    Waiting goals are accepted and can be canceled. Goals beyond the depth of the port's QoS are
-    rejected.
-    """
+    _context: NodeContext
 
     def __init__(
         self, context: NodeContext, port: Port, reaction: RunningReaction | None, handlers: Handlers
     ) -> None:
         """Create the server. Raises MessageError."""
-        self._context = context
-        self._name = port.name.value
-        self._callback = f"action server '{self._name}'"
-        self._type = interface_class(port.interface.value)
-        self._accepts = port.accept.holds if port.accept is not None else None
+        super().__init__(context, port, interface_class(port.interface.value), handlers)
         self._reaction = reaction
-        self._handlers = handlers
-        self._steps = port.feedback
+        self._feedback_steps = port.feedback
         self._feedback = _compile_feedback(port.feedback, self._type)
         self._result: Build | None = None
         if port.result is not None:
             self._result = compile_message(port.result, self._type.Result, "'result'")
-        self._goals: dict[bytes, RunningGoal] = {}
-        self._limit = None if port.reentrant else port.qos.profile.queue_depth
         self._count = 0
         statistics = context.statistics.callback(port.kind.value, self._name)
         self._timer = CallbackTimer(context, statistics, port.budget_ms)
-        self._queue = queue_for(context, self._run, None, depth=None, reentrant=port.reentrant)
         profile = rclpy_profile(port.qos.profile)
         self._server = GoalServer(
             context.node,
@@ -163,72 +137,30 @@ class ActionServerPort(RunningPort):
         self._local = LocalActionServer(port, self._server, context.loop.run_task)
         self._remove = context.router.add_action_server(port, self._local)
 
-    def deactivate(self) -> None:
-        """Cancel the waiting goals and request cancellation of the running ones."""
-        for goal in self._queue.clear():
-            self._end(goal, None, canceled=True)
-        for goal in self._goals.values():
-            goal.request_cancel()
-
-    async def drain(self) -> None:
-        """Wait until the handlers have ended their goals; after a time limit, cancel them."""
-        for goal in tuple(self._goals.values()):
-            if not await wait_for(self._context.loop, goal.ended, CANCEL_LIMIT_S):
-                self._context.log.warn(
-                    f"{self._callback}: a goal did not end within {CANCEL_LIMIT_S:g} s, canceled"
-                )
-                self._force_cancel(goal)
-
     def destroy(self) -> None:
         """Cancel the remaining goals and destroy the server."""
         self._remove()
-        for goal in tuple(self._goals.values()):
-            self._force_cancel(goal)
+        super().destroy()
         self._context.loop.remove(self._server)
         self._server.destroy()
 
     # --- requests
 
     async def _on_goal_request(self, request: Any) -> GoalResponse:
-        try:
-            reason = await self._rejection(request)
-        except BaseException as error:
-            self._context.on_exception(f"accept_{self._name}", error)
-            return GoalResponse.REJECT
-        if reason is None:
-            return GoalResponse.ACCEPT
-        self._context.log.info(f"{self._callback} rejects a goal: {reason}")
-        return GoalResponse.REJECT
-
-    @calls_user_code
-    async def _rejection(self, request: Any) -> str | None:
-        """Return why the goal is rejected, or None if it is accepted."""
-        if not self._context.gate.incoming:
-            return self._context.gate.refusal
-        if self._limit is not None and len(self._goals) > self._limit:
-            return f"{self._limit} goals are waiting already"
-        if self._accepts is not None and not self._accepts(self._context.names | {"goal": request}):
-            return "it does not fulfill 'accept'"
-        if self._handlers.accept is not None:
-            accepted = self._handlers.accept(request)
-            if isinstance(accepted, Awaitable):
-                accepted = await accepted
-            if accepted is not True:
-                return f"accept_{self._name} returned {shown(accepted)}"
-        return None if self._context.gate.incoming else self._context.gate.refusal
+        is_accepted = await self._is_accepted(request)
+        return GoalResponse.ACCEPT if is_accepted else GoalResponse.REJECT
 
     def _on_accepted(self, handle: ServerGoalHandle) -> None:
-        goal = RunningGoal(handle, self._publish_feedback)
-        self._context.statistics.calls += 1
-        self._goals[goal.identity] = goal
-        self._queue.put(goal)
+        self._start(RunningGoal(handle, self._publish_feedback))
 
     def _publish_feedback(self, goal_id: UUID, feedback: Any) -> None:
         self._tap.feedback(goal_id, feedback)
         self._local.publish_feedback(bytes(goal_id.uuid), feedback)
 
     def _on_cancel_request(self, handle: ServerGoalHandle) -> CancelResponse:
-        goal = self._goals.get(bytes(handle.goal_id.uuid))
+        identity = bytes(handle.goal_id.uuid)
+        goals = tuple(self._goals)  # another thread may change it
+        goal = next((item for item in goals if item.identity == identity), None)
         if goal is not None and not goal.has_begun:
             # It is waiting. rclpy sets its status to canceling after this call.
             self._context.loop.call_soon(lambda: self._end(goal, None, canceled=True))
@@ -236,47 +168,18 @@ class ActionServerPort(RunningPort):
 
     # --- execution
 
-    def _run(self, goal: RunningGoal) -> Coroutine[Any, Any, None] | None:
-        if not goal.is_open:
-            return None  # canceled while it waited
-        goal.has_begun = True
-        goal.execute()
-        steps = self._timer.wrap_steps(self._execute(goal))
-        goal.task = self._context.spawn(self._context.strand.wrap(steps))
-        return self._follow(goal, goal.task)
+    def _steps(self, goal: RunningGoal) -> Coroutine[Any, Any, Any]:
+        return self._timer.wrap_steps(super()._steps(goal))
 
-    async def _follow(self, goal: RunningGoal, task: Future[Any]) -> None:
-        """End the goal when its execution ends, however it ends."""
-        try:
-            result = await task
-        except Cancelled:
-            self._end(goal, None, canceled=True)
-        except CallCancelled as error:
-            self._context.log.debug(f"{self._callback}: {text_of(error)}")
-            self._end(goal, None, canceled=True)
-        except BaseException as error:
-            if is_closing(error):
-                raise
-            name = f"on_{self._name}" if self._handlers.execute else self._callback
-            self._context.error_log.exception(name, error)
-            self._end(goal, None, canceled=False)
-        else:
-            self._finish(goal, result)
-
-    @calls_user_code
     async def _execute(self, goal: RunningGoal) -> Any:
         scope = self._context.names | {"goal": goal.request}
         scope |= {"count": self._count, "now": self._context.now_s()}
         self._count += 1
         if self._reaction is not None:
             self._reaction.run(goal=goal.request)
-        if self._steps is not None:
-            await self._publish_feedback_steps(goal, self._steps, scope)
-        result = None
-        if self._handlers.execute is not None:
-            result = self._handlers.execute(goal)
-            if isinstance(result, Awaitable):
-                result = await result
+        if self._feedback_steps is not None:
+            await self._publish_feedback_steps(goal, self._feedback_steps, scope)
+        result = await super()._execute(goal)
         if result is None and self._result is not None and not goal.is_cancel_requested:
             result = self._result(scope)
         return result
@@ -293,56 +196,21 @@ class ActionServerPort(RunningPort):
             pause = sleep(self._context.clock, steps.period_ms.value / 1000.0)
             await self._context.gate.pending.add(pause)
 
-    # --- results
-
-    def _finish(self, goal: RunningGoal, result: Any) -> None:
-        """End the goal unless its handler has ended it.
-
-        It succeeds, or is canceled if that was requested.
-        """
-        objection = self._objection(result)
-        if objection:
-            self._context.error_log.error(f"on_{self._name}", objection)
-            self._end(goal, None, canceled=False)
-            return
-        if goal.is_open:
-            if goal.is_cancel_requested:
-                goal.canceled()
-            else:
-                goal.succeed()
-        self._end(goal, result, canceled=False)
-
     def _objection(self, result: Any) -> str:
-        """Return why a handler's result cannot be sent; empty if it can."""
-        if result is None:
-            return ""
-        if not issubclass(type(result), self._type.Result):
-            return f"returned {shown(result)}, not a {self._type.__name__}.Result"
+        if objection := super()._objection(result):
+            return objection
         try:
-            serialize_message(result)
+            if result is not None:
+                serialize_message(result)
         except Exception as error:  # such as a string that is not valid Unicode
             return f"returned a result that cannot be sent: {describe(error)}"
         return ""
 
-    def _force_cancel(self, goal: RunningGoal) -> None:
-        self._end(goal, None, canceled=True)
-        if goal.task is not None:
-            goal.task.cancel()
-
-    def _end(self, goal: RunningGoal, result: Any, *, canceled: bool) -> None:
-        """Cancel or abort a goal that is still open, and send its result, once."""
-        if self._goals.pop(goal.identity, None) is None:
-            return
-        if goal.is_open:
-            if canceled:
-                goal.canceled()
-            else:
-                goal.abort()
+    def _send_result(self, goal: RunningGoal, result: Any) -> None:
         response = self._type.Impl.GetResultService.Response()
         response.status = goal.status
-        response.result = self._type.Result() if result is None else result
+        response.result = result
         self._server.end(goal.identity, response)
-        goal.ended.set_result(None)
 
 
 def _compile_feedback(steps: FeedbackSteps | None, action_type: Any) -> Build | None:

@@ -2,66 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from rclpy.service import Service
 
-from composer.behavior import CallError, ServerUnavailable
 from composer.model import Port
 from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.executors.exceptions import describe, is_closing, shown
-from composer.runtime.executors.futures import Cancelled
-from composer.runtime.executors.sources import Reply, unused_callback
-from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.sources import unused_callback
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
-from composer.runtime.ports import RunningPort
+from composer.runtime.ports.serving import Handler, RequestServer
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 
-Handler = Callable[[Any, Any], Any]
 
+class ServicePort(RequestServer):
+    """A server with a service of rclpy."""
 
-class PendingRequest:
-    """A request without a response. It is answered once."""
-
-    __slots__ = ("_pending", "_reply", "content")
-
-    def __init__(self, content: Any, reply: Reply, pending: set[PendingRequest]) -> None:
-        self.content = content
-        self._reply = reply
-        self._pending = pending
-        pending.add(self)
-
-    def respond(self, response: Any) -> None:
-        """Send ``response``, unless there was one already."""
-        if self in self._pending:
-            self._pending.discard(self)
-            try:
-                self._reply(response)
-            except BaseException:  # it cannot be sent, but another one can
-                self._pending.add(self)
-                raise
-
-    def refuse(self, error: CallError) -> None:
-        """Send no response, unless there was one already."""
-        if self in self._pending:
-            self._pending.discard(self)
-            self._reply.refuse(error)
-
-
-class ServicePort(RunningPort):
-    """Responds to requests by its reaction and handler while the node is active.
-
-    Otherwise a request is refused. If a request is refused or its handler fails, the response has
-    ``success`` false and the reason in ``message``, if it has such fields. A response without
-    ``success`` would look like a result: there is none, a client in this process gets the error,
-    and any other one waits until its time is over. See docs/decisions/0009-lifecycle-and-gate.md.
-    """
+    _context: NodeContext
 
     def __init__(
         self,
@@ -70,26 +30,10 @@ class ServicePort(RunningPort):
         reaction: RunningReaction | None,
         handler: Handler | None,
     ) -> None:
-        self._context = context
-        self._name = port.name.value
-        self._full_name = port.full_name
-        self._type = self._interface(port)
-        self._response_type: Any = self._type.Response
-        fields = self._response_type.get_fields_and_field_types()
-        self._can_fail = fields.get("success") == "boolean"
-        self._has_reason = fields.get("message") == "string"
-        self._reaction = reaction
-        self._handler = handler
-        self._pending: set[PendingRequest] = set()
-        # Clients wait for a response and time out by themselves, so no request is dropped.
-        statistics = context.statistics.callback(port.kind.value, self._name)
-        self._queue = queue_for(
-            context,
-            self._handle,
-            CallbackTimer(context, statistics, port.budget_ms),
-            depth=None,
-            reentrant=port.reentrant,
-        )
+        statistics = context.statistics.callback(port.kind.value, port.name.value)
+        timer = CallbackTimer(context, statistics, port.budget_ms)
+        super().__init__(context, port, self._interface(port), handler, timer)
+        self._react = None if reaction is None else reaction.run
         self._service = self._make_service(port)
         tap = CallTap.of_port(context.router.recorder, port, self._type, context.loop.clock)
         receive = tap.recorded(self.on_request)
@@ -99,25 +43,10 @@ class ServicePort(RunningPort):
         )
         self._remove = context.router.add_service(port, local)
 
-    def on_request(self, content: Any, reply: Reply) -> None:
-        """Handle a request."""
-        request = PendingRequest(content, reply, self._pending)
-        if not self._context.gate.incoming:
-            self._refuse(request)
-            return
-        self._context.statistics.calls += 1
-        self._queue.put(request)
-
-    def deactivate(self) -> None:
-        """Refuse the waiting requests."""
-        for request in self._queue.clear():
-            self._refuse(request)
-
     def destroy(self) -> None:
         """Refuse the pending requests and destroy the service."""
         self._remove()
-        for request in tuple(self._pending):
-            self._refuse(request)
+        super().destroy()
         self._context.loop.remove(self._service)
         self._destroy_service()
 
@@ -135,73 +64,3 @@ class ServicePort(RunningPort):
 
     def _destroy_service(self) -> None:
         self._context.node.destroy_service(self._service)
-
-    def _refuse(self, request: PendingRequest) -> None:
-        reason = self._context.gate.refusal
-        if not (self._can_fail and self._has_reason):
-            self._context.log.warn(f"service '{self._name}' refuses a request: {reason}")
-        self._respond_with_failure(request, reason, ServerUnavailable)
-
-    def _respond_with_failure(
-        self, request: PendingRequest, reason: str, kind: type[CallError] = CallError
-    ) -> None:
-        if not self._can_fail:
-            request.refuse(kind(f"service '{self._full_name}': {reason}"))
-            return
-        response = self._response_type()
-        if self._has_reason:
-            response.message = reason
-        request.respond(response)
-
-    @calls_user_code
-    def _handle(self, request: PendingRequest) -> Coroutine[Any, Any, None] | None:
-        response = None
-        if self._reaction is not None:
-            try:
-                response = self._reaction.run(request=request.content)
-            except Exception as error:
-                self._fail(request, f"service '{self._name}'", error)
-                return None
-        if response is None:
-            response = self._response_type()
-        if self._handler is None:
-            request.respond(response)
-            return None
-        try:
-            result = self._handler(request.content, response)
-            if not isinstance(result, self._response_type) and isinstance(result, Awaitable):
-                return self._respond_later(request, result)
-            self._respond(request, result)
-        except BaseException as error:
-            self._fail(request, self._callback, error)
-        return None
-
-    @property
-    def _callback(self) -> str:
-        return f"on_{self._name}"
-
-    @calls_user_code
-    async def _respond_later(self, request: PendingRequest, result: Awaitable[Any]) -> None:
-        try:
-            self._respond(request, await result)
-        except Cancelled:
-            self._refuse(request)
-            raise
-        except BaseException as error:
-            if is_closing(error):
-                self._refuse(request)
-                raise
-            self._respond_with_failure(request, f"{self._callback}: {describe(error)}")
-            self._context.on_exception(self._callback, error)
-
-    def _respond(self, request: PendingRequest, result: Any) -> None:
-        if isinstance(result, self._response_type):
-            request.respond(result)
-            return
-        text = f"returned {shown(result)}, not a {self._type.__name__}.Response"
-        self._context.error_log.error(self._callback, text)
-        self._respond_with_failure(request, f"{self._callback} {text}")
-
-    def _fail(self, request: PendingRequest, callback: str, error: BaseException) -> None:
-        self._context.error_log.exception(callback, error)
-        self._respond_with_failure(request, f"{callback}: {describe(error)}")

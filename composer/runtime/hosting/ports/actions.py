@@ -21,7 +21,7 @@ from composer.runtime.hosting.user_code import UserFunction, call_in_group, inte
 from composer.runtime.intra_process.servers import LocalActionServer, LocalGoal, new_goal_id
 from composer.runtime.intra_process.taps import GoalTap
 from composer.runtime.ports import RunningPort
-from composer.runtime.ports.action_server import CANCEL_LIMIT_S
+from composer.runtime.ports.goals import CANCEL_LIMIT_S
 
 
 class HostedActionServer(RunningPort):
