@@ -108,7 +108,11 @@ def plain(tree: Tree) -> Plain:
         case Sequence():
             return [plain(item) for item in tree.items]
         case Mapping():
-            return {entry.name: plain(entry.value) for entry in tree}
+            found: dict[str, Plain] = {}
+            for entry in tree.entries:
+                value = entry.value
+                found[entry.name] = value.value if isinstance(value, Scalar) else plain(value)
+            return found
 
 
 def count_values(tree: Tree) -> int:
@@ -119,7 +123,8 @@ def count_values(tree: Tree) -> int:
         case Sequence(items=items):
             return 1 + sum(map(count_values, items))
         case Mapping(entries=entries):
-            return 1 + len(entries) + sum([count_values(entry.value) for entry in entries])
+            inner = [entry.value for entry in entries if not isinstance(entry.value, Scalar)]
+            return 1 + 2 * len(entries) - len(inner) + sum(map(count_values, inner))
 
 
 def describe(tree: Tree) -> str:

@@ -102,7 +102,7 @@ def value_or(found: Located[T] | None, default: D) -> T | D:
     return default if found is None else found.value
 
 
-def flag(tree: Tree | None, default: bool) -> bool:
+def flag(tree: Tree | None, default: D) -> bool | D:
     """Return a boolean; ``default`` for other values."""
     return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, bool) else default
 

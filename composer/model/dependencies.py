@@ -111,13 +111,16 @@ def implied_edges(system: System) -> Iterator[DependencyEdge]:
     """
     if not system.implied_dependencies:
         return
-    for channel in channels(system.nodes):
-        if channel.kind is ChannelKind.TOPIC or not channel.sources:
-            continue
-        server = channel.sources[0].node.name.value
-        for client in dict.fromkeys(end.node.name.value for end in channel.sinks):
-            if client != server:
-                yield DependencyEdge(client, server, serves=channel.name)
+    ends = (
+        (port.kind, port.full_name, node.name.value)
+        for node in system.nodes
+        for port in node.ports
+        if port.kind.channel is not ChannelKind.TOPIC
+    )
+    for _, name, servers, clients in by_channel(ends):
+        for client in dict.fromkeys(clients) if servers else ():
+            if client != servers[0]:
+                yield DependencyEdge(client, servers[0], serves=name)
 
 
 def dependency_edges(system: System) -> tuple[DependencyEdge, ...]:

@@ -25,6 +25,7 @@ PROGRAM_LOGGER = "compose"
 
 _RULE_PREFIX = re.compile(r"(\w+:(?!//))?((rostopic|rosservice)://)?")
 _FOREIGN_CHARACTER = re.compile(r"[^A-Za-z0-9_]")
+_VALID_PATH = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 def free_name(name: str, taken: Container[str]) -> str:
@@ -64,7 +65,7 @@ def topic_name_problem(name: str) -> str | None:
         return None
     return (
         _empty_problem(name)
-        or ("has no '/' after '~'" if re.match(r"~[^/]", name) else None)
+        or ("has no '/' after '~'" if name[0] == "~" and name[1] != "/" else None)
         or _path_problem(name.removeprefix("~").removeprefix("/"))
         or _length_problem(name, MAXIMUM_TOPIC_NAME_LENGTH)
     )
@@ -125,7 +126,7 @@ def split_node_name(full_name: str) -> tuple[str, str]:
 
 def is_hidden(name: str) -> bool:
     """Return whether ROS tools hide ``name`` by default: a part begins with an underscore."""
-    return any(token.startswith("_") for token in name.split("/"))
+    return name.startswith("_") or "/_" in name
 
 
 def matches_wildcard(pattern: str, part: str) -> bool:
@@ -178,6 +179,8 @@ def _character_problem(text: str) -> str | None:
 
 def _path_problem(path: str) -> str | None:
     """Check the parts between slashes."""
+    if _VALID_PATH.fullmatch(path) and "__" not in path:
+        return None
     *_, last = tokens = path.split("/")
     if not last:
         return "ends with '/'"

@@ -112,12 +112,14 @@ def check_wrong_interface_kind(context: Context) -> Iterator[Diagnostic]:
 
 def check_outdated_interface(context: Context) -> Iterator[Diagnostic]:
     """Compare the project's definitions of all port types with the installed ones, if any."""
+    checked: set[str] = set()
     reported: set[str] = set()
     for node in context.system.nodes:
         for port in node.ports:
             name = port.interface
-            if is_unresolved(name.value):
+            if name.value in checked or is_unresolved(name.value):
                 continue
+            checked.add(name.value)
             outdated = context.interfaces.outdated(name.value)
             if outdated is None or outdated in reported:
                 continue

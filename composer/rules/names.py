@@ -117,7 +117,7 @@ def check_invalid_ros_name(context: Context) -> Iterator[Diagnostic]:
 def _ros_names(context: Context) -> Iterator[tuple[str, Located[str], Connection | None]]:
     for node in context.system.nodes:
         for port in node.ports:
-            yield port.kind.channel.value, port.ros_name, None
+            yield port.kind.channel, port.ros_name, None
         is_rule_of_rcl = not node.implementation.declares_everything
         for remapping in node.remappings:
             source = remapping.source.map(remapped_name if is_rule_of_rcl else str)
@@ -240,6 +240,6 @@ def _visible_names(context: Context) -> Iterator[tuple[str, Located[str]]]:
     for node in context.system.nodes:
         yield "node", node.ros_name
         for port in node.ports:
-            yield port.kind.channel.value, port.ros_name
+            yield port.kind.channel, port.ros_name
     for connection in context.system.connections:
         yield connection.kind.value, connection.name

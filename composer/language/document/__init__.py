@@ -119,8 +119,7 @@ def _build(
         return diagnostics
     try:
         with closing(parse_events(source.text if text is None else text)) as stream:
-            for event in stream:
-                builder.handle(event)
+            builder.handle(stream)
     except Stopped as stopped:
         return [*builder.diagnostics, stopped.diagnostic]
     except (yaml.YAMLError, ValueError) as error:

@@ -7,7 +7,7 @@ by one, so that the builder can stop the parser early. Their marks count from 0,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from typing import Any, Protocol
 
 import yaml
@@ -150,11 +150,12 @@ class TreeBuilder:
         """The location of the innermost '[' or '{' that has not been closed."""
         return next((part.start for part in reversed(self._open) if part.is_flow), None)
 
-    def handle(self, event: yaml.Event) -> None:
-        """Handle the next event. Raises Stopped."""
-        handler = self._handlers.get(type(event))
-        if handler is not None:
-            handler(event)
+    def handle(self, events: Iterable[yaml.Event]) -> None:
+        """Handle the events of a text. Raises Stopped."""
+        handlers = self._handlers
+        for event in events:
+            if (handler := handlers.get(type(event))) is not None:
+                handler(event)
 
     def _on_document(self, event: yaml.DocumentStartEvent) -> None:
         if self.root is None:

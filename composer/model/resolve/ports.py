@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from collections.abc import Mapping as Map
+from functools import partial
+from typing import Any
+
 from composer.base.diagnostics import Diagnostic, error
 from composer.base.source import Located, Span
 from composer.language.expressions import Expression, ExpressionError, compile_expression
@@ -178,7 +183,7 @@ def _port(
     span = entry.key.span
     tree = mapping(entry)
     name = key(entry)
-    ros_name = text(tree.get(kind.channel.value)) or name
+    ros_name = text(tree.get(kind.channel)) or name
     accept = expression(tree.get("accept"), diagnostics)
     return Port(
         kind,
@@ -189,24 +194,36 @@ def _port(
         qos.resolve(tree.get("qos"), implicit_qos(kind.channel, span)),
         span,
         _reactions(kind, entry, tree, diagnostics),
-        timeout_ms=_timeout(kind, tree, span),
-        result_timeout_ms=number(tree.get("result_timeout_ms")),
+        _timeout(kind, tree, span),
         accept=accept.value if accept is not None else None,
         accept_span=accept.span if accept is not None else None,
         feedback=_feedback(tree.entry("feedback"), diagnostics),
         result=template(tree.get("result"), diagnostics),
-        budget_ms=number(tree.get("budget_ms")),
-        reentrant=flag(tree.get("reentrant"), default=False),
-        always_on=flag(tree.get("always_on"), default=False),
-        external=flag(tree.get("external"), default=False),
         isolation=value_or(choice(tree.get("isolation"), Isolation), isolation),
-        required=_required(tree.get("required")),
-        description=plain_text(tree.get("description")),
+        **_settings(tree),
     )
 
 
-def _required(tree: Tree | None) -> bool | None:
-    return tree.value if isinstance(tree, Scalar) and isinstance(tree.value, bool) else None
+_IS_SET = partial(flag, default=False)
+#: The keys of ports of all kinds, and how to read them.
+_SETTINGS: Map[str, Callable[[Tree], Any]] = {
+    "result_timeout_ms": number,
+    "budget_ms": number,
+    "reentrant": _IS_SET,
+    "always_on": _IS_SET,
+    "external": _IS_SET,
+    "required": partial(flag, default=None),
+    "description": plain_text,
+}
+
+
+def _settings(tree: Mapping) -> dict[str, Any]:
+    """Return the settings that are written: of most ports, that is less than reading them all."""
+    return {
+        name: _SETTINGS[name](entry.value)
+        for entry in tree.entries
+        if (name := entry.name) in _SETTINGS
+    }
 
 
 def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None:

@@ -132,6 +132,8 @@ def _channels(context: Context) -> tuple[Channel, ...]:
 
 
 def _all_channels(context: Context) -> tuple[Channel, ...]:
+    if all(node.transforms is None for node in context.system.nodes):
+        return context.channels
     return _known(channels(context.system.nodes, with_transforms=True))
 
 

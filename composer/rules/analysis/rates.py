@@ -78,7 +78,7 @@ def causes_in_node(
     known: dict[str, list[Cause]] = {
         port.name.value: [] for port in node.ports_of(PortKind.PUBLISHER)
     }
-    bound = {handler.name for handler in handlers(node)}
+    bound = {handler.name for handler in handlers(node)} if by_method else set()
     # Neither a handler nor a transition: it may publish at any time, for example from a thread.
     for name, ports in by_method.items():
         if name not in bound and name not in GENERAL_HANDLERS:
@@ -94,15 +94,17 @@ def causes_in_node(
 def _callbacks(
     node: Node, by_method: Mapping[str, frozenset[str]]
 ) -> Iterator[tuple[Cause, frozenset[str]]]:
-    """Yield every callback with the names of the ports that it publishes through."""
+    """Yield the callbacks that publish, with the names of the ports that they use."""
     for timer in node.timers:
         reactions = [timer.reaction] if timer.reaction is not None else []
         ports = _published(reactions) | by_method.get(f"on_{timer.name}", frozenset())
-        yield Cause(timer=timer), ports
+        if ports:
+            yield Cause(timer=timer), ports
     for port in node.ports:
         events: list[Reaction] = [reaction for _, reaction in port.reactions]
         ports = _published(events) | by_method.get(f"on_{port.name}", frozenset())
-        yield Cause(port=port), ports
+        if ports:
+            yield Cause(port=port), ports
 
 
 def _published(reactions: list[Reaction]) -> frozenset[str]:
