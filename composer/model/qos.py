@@ -168,6 +168,8 @@ def incompatibilities(offered: QosProfile, requested: QosProfile) -> tuple[Incom
     as strong. The rule comes from DDS (OMG DDS 1.4, 2.2.3) as ``rmw_qos_profile_check_compatible``
     states it. History, depth and lifespan never matter.
     """
+    if offered is requested:
+        return ()
     found = []
     for policy, reason in DECIDING_POLICIES.items():
         offer, request = getattr(offered, policy), getattr(requested, policy)

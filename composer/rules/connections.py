@@ -51,7 +51,7 @@ def unconnected_ports(context: Context, kind: PortKind) -> Iterator[PortOfNode]:
     connection (``from`` without ``to`` is deliberate). So are ports that may lack a counterpart due
     to an earlier error or an unknown node type.
     """
-    if not _is_fully_known(context):
+    if not context.once(_is_fully_known):
         return
     connected, affected = context.once(_connected), context.once(_names_of_affected)
     for channel in context.channels:

@@ -150,7 +150,7 @@ def check_invalid_value(context: Context) -> Iterator[Diagnostic]:
 
 def check_unknown_enumerator(context: Context) -> Iterator[Diagnostic]:
     """Check the numbers that message fields are set to."""
-    for template, message in message_templates(context):
+    for template, message in context.once(message_templates):
         yield from _unknown_enumerators(template, message, context.interfaces)
 
 

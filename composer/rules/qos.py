@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import islice
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, info, suggestion, warning
 from composer.base.graphs import cycles
@@ -228,11 +229,15 @@ def check_reliable_sensor_stream(context: Context) -> Iterator[Diagnostic]:
     for channel in context.channels:
         if channel.kind is not ChannelKind.TOPIC:
             continue
-        sinks = tuple(end for end in channel.sinks if _is_reliable(end.port))
         for source in channel.sources:
-            rate_hz = known.publisher_hz(source) if _is_reliable(source.port) else None
-            if _is_stream(source.port.interface.value) and (rate_hz or 0.0) >= FAST_HZ:
-                yield _reliable_stream(source.port, rate_hz or 0.0, sinks)
+            if not (_is_stream(source.port.interface.value) and _is_reliable(source.port)):
+                continue
+            rate_hz = known.publisher_hz(source) or 0.0
+            if rate_hz >= FAST_HZ:
+                sinks = tuple(
+                    islice((e for e in channel.sinks if _is_reliable(e.port)), _SHOWN_SINKS)
+                )
+                yield _reliable_stream(source.port, rate_hz, sinks)
 
 
 def _is_stream(interface: str) -> bool:
@@ -258,7 +263,7 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
         port.qos.policy_span("reliability"),
         tuple(
             Label(sink.port.qos.policy_span("reliability"), f"'{port_name(sink)}' requests it")
-            for sink in sinks[:_SHOWN_SINKS]
+            for sink in sinks
         ),
         hint,
         relies_on=(("topic qos", port.full_name),),

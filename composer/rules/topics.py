@@ -78,7 +78,7 @@ def _topic_loop(names: tuple[str, ...], endpoints: list[PortOfNode]) -> Diagnost
 def check_own_publisher(context: Context) -> Iterator[Diagnostic]:
     """Look for topics that exactly one node both publishes and subscribes to."""
     for channel in context.channels:
-        if channel.kind is not ChannelKind.TOPIC:
+        if channel.kind is not ChannelKind.TOPIC or not (channel.sources and channel.sinks):
             continue
         publishers = {end.node.full_name: end for end in channel.sources}
         both = [end for end in channel.sinks if end.node.full_name in publishers]
@@ -199,13 +199,16 @@ def _other_name_hint(channel: Channel, other: PortOfNode) -> str:
 def check_client_before_server(context: Context) -> Iterator[Diagnostic]:
     """Compare the bring-up order with the services and actions."""
     system = context.system
-    if dependency_cycles(system) or not system.implied_dependencies:
+    called = [
+        channel
+        for channel in context.channels
+        if channel.kind is not ChannelKind.TOPIC and len(channel.sources) == 1
+    ]
+    if not called or dependency_cycles(system) or not system.implied_dependencies:
         return
     order = in_dependency_order(system)
     rank = {name: place for place, name in enumerate(order)}
-    for channel in context.channels:
-        if channel.kind is ChannelKind.TOPIC or len(channel.sources) != 1:
-            continue
+    for channel in called:
         server = channel.sources[0]
         for client in channel.sinks:
             if rank[client.node.name.value] < rank[server.node.name.value]:

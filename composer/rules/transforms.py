@@ -175,7 +175,7 @@ _FIELDS = frozenset({"frame_id", "child_frame_id"})
 
 def check_frame_id_slash(context: Context) -> Iterator[Diagnostic]:
     """Check the frame IDs in messages, transforms and behaviors, and in parameters for them."""
-    for template, _ in message_templates(context):
+    for template, _ in context.once(message_templates):
         yield from _slashes_in_template(template)
     for node in context.system.nodes:
         for parameter in node.parameters:

@@ -206,10 +206,10 @@ _CHARACTERS_PER_VALUE = 2
 def _size(tree: Tree, name: str = "") -> int:
     """Return the number of keys and values under the key ``name``."""
     match tree:
-        case Mapping():
-            return 1 + sum(1 + _size(entry.value, entry.name) for entry in tree)
+        case Mapping(entries=entries):
+            return 1 + len(entries) + sum([_size(entry.value, entry.name) for entry in entries])
         case Sequence(items=items):
-            return 1 + sum(_size(item, name) for item in items)
+            return 1 + sum([_size(item, name) for item in items])
         case Scalar(value=str() as text) if "{" in text or name in ("when", "accept"):
             return _VALUES_PER_EXPRESSION + len(text) // _CHARACTERS_PER_VALUE
         case _:

@@ -52,8 +52,12 @@ def sends(system: System) -> Iterator[tuple[ReactionSite, str, Send]]:
             yield site, "call", send
 
 
-def message_templates(context: Context) -> Iterator[tuple[Template, Message]]:
-    """Yield the templates of all messages, requests, responses, feedback and results."""
+def message_templates(context: Context) -> tuple[tuple[Template, Message], ...]:
+    """Return the templates of all messages, requests, responses, feedback and results."""
+    return tuple(_message_templates(context))
+
+
+def _message_templates(context: Context) -> Iterator[tuple[Template, Message]]:
     for site in reactions(context.system):
         for send in (*site.reaction.publish, *site.reaction.call):
             message = context.sent(site.node.port(send.port.value))
