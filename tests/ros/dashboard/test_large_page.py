@@ -26,7 +26,7 @@ def fleet(shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory) -> It
     path = tmp_path_factory.mktemp("fleet") / "fleet.yaml"
     path.write_text(fleet_text(NODES), encoding="utf-8")
     with RunningSystem(str(path)) as system:
-        system.wait_for(f"{NODES} of {NODES} nodes active", 60.0)
+        system.wait_for(f"{NODES} of {NODES} nodes active", 120.0)
         with dashboard(str(path), cwd=Path(path).parent) as running:
             yield running
 

@@ -108,7 +108,7 @@ def test_the_end_does_not_wait_for_an_absent_node(tmp_path: Path) -> None:
 
 ELSEWHERE = """
 system: robot
-nodes: {lidar: {name: NAME, namespace: elsewhere, external: {ready_timeout_ms: 300}}}
+nodes: {lidar: {name: NAME, namespace: elsewhere, external: {ready_timeout_ms: 5000}}}
 """
 
 
@@ -119,7 +119,7 @@ nodes: {lidar: {name: NAME, namespace: elsewhere, external: {ready_timeout_ms: 3
             EXTERNAL.replace("TIMEOUT", "300"),
             "no publisher /scan, service /reset after 0.3 s; start",
         ),
-        (ELSEWHERE, "ROS graph after 0.3 s; there is /NAME instead: write 'namespace: /'"),
+        (ELSEWHERE, "ROS graph after 5 s; there is /NAME instead: write 'namespace: /'"),
     ],
 )
 def test_an_absent_external_node_fails_a_bring_up_that_is_all_or_nothing(
