@@ -72,18 +72,24 @@ def test_stamps_have_the_time_of_the_run() -> None:
     assert stamps == [(8, 100_000_000), (0, 0)]
 
 
-def with_a_damaged_chunk(data: bytes) -> bytes:
-    """Return a bag with zeros in the middle of its first chunk: in the data of messages."""
-    at = 8  # after the magic bytes there are records: an operation, a length and so many bytes
-    while data[at] != 6:
-        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
-    middle = at + int.from_bytes(data[at + 1 : at + 9], "little") // 2
-    return data[:middle] + bytes(100) + data[middle + 100 :]
+def with_damaged_chunks(data: bytes) -> bytes:
+    """Return a bag with zeros in the data of messages.
+
+    In each chunk: one ends each second of real time, so a topic may be missing in any of them.
+    """
+    damaged, at = bytearray(data), 8  # after the magic bytes
+    while at < len(data) - 8:  # an operation, the length of a record, and the record
+        end = at + 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        if data[at] == 6:
+            middle = (at + end) // 2
+            damaged[middle : middle + 20] = bytes(20)
+        at = end
+    return bytes(damaged)
 
 
 @pytest.mark.parametrize(
     ("damage", "text"),
-    [(lambda _: b"", "is empty"), (with_a_damaged_chunk, "is corrupt or not supported")],
+    [(lambda _: b"", "is empty"), (with_damaged_chunks, "is corrupt or not supported")],
 )
 def test_a_damaged_bag_fails_the_step(
     damage: Callable[[bytes], bytes], text: str, recorded: Path
