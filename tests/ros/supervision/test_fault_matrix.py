@@ -22,6 +22,7 @@ from std_srvs.srv import Trigger
 from tests.ros.support.faulty_system import (
     CALLBACKS,
     FAULTS,
+    METRONOME,
     PLACES,
     TRANSITIONS,
     write_faulty_system,
@@ -47,7 +48,7 @@ STEPS = {
     ("active", "unconfigured"): "deactivate",
     ("inactive", "unconfigured"): "cleanup",
 }
-CONTROL = "/control"  # the namespace of the same system without faults
+CONTROL = "/control"  # the namespace of the metronome alone, in another process
 ENOUGH_BEATS = 80  # so that one beat is well below the 5 %
 ATTEMPTS = 3
 RAISED, EXITED = "ValueError: broken", "SystemExit: out"
@@ -254,8 +255,10 @@ def fail_everywhere(
 
 def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
     path = write_faulty_system(tmp_path)
+    alone = tmp_path / "alone.yaml"
+    alone.write_text(METRONOME, encoding="utf-8")
     with (
-        RunningSystem(str(path), "--autostart", "active", "--namespace", CONTROL) as control,
+        RunningSystem(str(alone), "--autostart", "active", "--namespace", CONTROL) as control,
         RunningSystem(str(path), "--autostart", "active") as system,
     ):
         for running in (control, system):

@@ -12,10 +12,11 @@ PLACES = (*TRANSITIONS, *CALLBACKS)
 FAULTS = ("raise", "none", "nonsense", "exit", "once")
 #: Hanging nodes have an executor each, which they block.
 HANGING = tuple(f"hang_{place}" for place in PLACES)
-SYSTEM = """
+#: Alone, the control.
+METRONOME = """
 system: faulty
 lifecycle: {on_failure: isolate}
-executors: {calm: {kind: events}, EXECUTORS}
+executors: {calm: {kind: events}}
 nodes:
   metronome:
     executor: calm  # creating and destroying endpoints takes time on an executor
@@ -31,7 +32,7 @@ NODE = """
     services: {ask: {type: std_srvs/srv/Trigger, service: ~/ask, external: true}}
     action_servers:
       drive: {type: composer_interfaces/action/Navigate, action: ~/drive, external: true}
-    timers: {tick: {period_ms: 20}}
+    timers: {tick: {period_ms: 50}}
     lifecycle: {timeout_ms: 2500, watch: {callback_ms: 300}}
 """
 MODULE = '''
@@ -114,6 +115,7 @@ def write_faulty_system(folder: Path) -> Path:
         NODE.replace("NAME", name).replace("EXECUTOR", f"executor: {name}") for name in HANGING
     ]
     path = folder / "faulty.yaml"
-    path.write_text(SYSTEM.replace("EXECUTORS", executors) + "".join(nodes), encoding="utf-8")
+    text = METRONOME.replace("events}}", f"events}}, {executors}}}")
+    path.write_text(text + "".join(nodes), encoding="utf-8")
     path.with_suffix(".py").write_text(dedent(MODULE), encoding="utf-8")
     return path
