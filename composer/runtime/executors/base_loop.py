@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable, Coroutine
 from math import floor, inf, isnan
+from threading import get_ident
 from typing import Any, Generic, TypeVar
 
 from composer.runtime.clock.clock import Clock
@@ -152,6 +153,30 @@ class TimerQueue(Generic[C]):
 
 T = TypeVar("T")
 
+
+class _Wait:
+    """A wait of a thread in :meth:`BaseLoop.wait`, and the exception that has ended it."""
+
+    __slots__ = ("event", "interrupted_by")
+
+    def __init__(self, event: threading.Event) -> None:
+        self.event = event
+        self.interrupted_by: type[BaseException] | None = None
+
+
+_WAITS: dict[int, _Wait] = {}  # by the identifiers of the threads that wait
+
+
+def end_wait(thread: int, kind: type[BaseException]) -> bool:
+    """Raise ``kind`` in a thread that waits for a loop; return false if it does not wait."""
+    wait = _WAITS.get(thread)
+    if wait is None:
+        return False
+    wait.interrupted_by = kind
+    wait.event.set()
+    return True
+
+
 #: After this time without a wait, a loop sleeps for :data:`YIELD_S`. Polling releases the
 #: interpreter's lock and takes it back before a waiting thread is awake. That thread counts it as
 #: a switch and does not request the lock: without the sleep it starves for seconds.
@@ -257,11 +282,21 @@ class BaseLoop(ABC):
         return result.result()
 
     def wait(self, event: threading.Event, timeout_s: float | None = None) -> None:
-        """Block until ``event`` is set or the time is over. A loop that stops sets the event."""
+        """Block until ``event`` is set or the time is over. A loop that stops sets the event.
+
+        Raises what :func:`end_wait` was given.
+        """
+        ident = get_ident()
         self._waits.add(event)
-        if not self._stopping:
-            self.clock.wait(event, timeout_s)
-        self._waits.discard(event)
+        _WAITS[ident] = wait = _Wait(event)
+        try:
+            if not self._stopping:
+                self.clock.wait(event, timeout_s)
+        finally:
+            _WAITS.pop(ident, None)
+            self._waits.discard(event)
+        if wait.interrupted_by is not None:
+            raise wait.interrupted_by
 
     def _end_waits(self) -> None:
         """Let all waits return; the loop is stopping."""

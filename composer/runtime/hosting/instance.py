@@ -32,11 +32,7 @@ from composer.runtime.executors.strand import ExclusiveStrand, ReentrantStrand, 
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.declared_ports import DeclaredPorts
 from composer.runtime.hosting.executor import InstanceExecutor
-from composer.runtime.hosting.user_code import (
-    CallAbandoned,
-    PermittedFunction,
-    UserFunction,
-)
+from composer.runtime.hosting.user_code import PermittedFunction, UserFunction
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.ports import PortSet, RunningPort
 
@@ -146,7 +142,6 @@ class Instance:
         self.interrupted: set[tuple[int, str]] = set()
         #: The threads that the class has started.
         self.threads: list[threading.Thread] = []
-        self._waits: dict[int, threading.Event] = {}  # by the threads that wait
         self.ports = ports
         self.settings = settings
         self.entities = PortSet()
@@ -274,22 +269,8 @@ class Instance:
 
         In a callback, the loop goes on. Raises CallAbandoned if the call is interrupted.
         """
-        ident = threading.get_ident()
-        self._waits[ident] = event
-        try:
-            self.context.loop.wait(event, timeout_s)
-        finally:
-            is_interrupted = self._waits.pop(ident, None) is None
-        if is_interrupted:
-            raise CallAbandoned
+        self.context.loop.wait(event, timeout_s)
         return event.is_set()
-
-    def end_wait(self, ident: int) -> bool:
-        """Interrupt what a thread waits for in :meth:`wait`; return false if it does not wait."""
-        event = self._waits.pop(ident, None)
-        if event is not None:
-            event.set()
-        return event is not None
 
     def wait_for(self, future: Awaited, timeout_s: float | None) -> bool:
         """Block until ``future`` is done, in code of the class; return false after the time.

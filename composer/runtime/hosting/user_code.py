@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from types import FrameType
 from typing import TYPE_CHECKING, Any, cast
 
@@ -12,18 +12,16 @@ from rclpy.callback_groups import CallbackGroup
 
 from composer.behavior import CallCancelled
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.stacks import (
     calls_user_code,
     gc_paused,
-    is_internal,
     location_of,
-    raise_in,
     stacks_of,
 )
 from composer.runtime.executors.strand import in_steps, scope_of
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.node.interruption import RunningCallback, running_callbacks
 
 if TYPE_CHECKING:
     from composer.runtime.hosting.instance import Instance
@@ -182,61 +180,38 @@ class CallAbandoned(Cancelled):
     """Raised in code of a class whose time is over. It is not a fault of the class."""
 
 
-def interrupt(instance: Instance, ident: int, call: FrameType | None = None) -> str:
-    """Raise CallAbandoned in a thread as soon as it runs code of the user; return where it is.
-
-    With ``call``, only until that call has returned. In a function of C, such as ``time.sleep``, it
-    is raised once that returns.
-    """
-    for _ in range(_ATTEMPTS):
-        stack = stacks_of((ident,)).get(ident, [])
-        if not stack or (call is not None and call not in stack):
-            return ""
-        if instance.end_wait(ident):
-            return location_of(stack)
-        if not is_internal(stack[0].f_code.co_filename):
-            raise_in(ident, CallAbandoned)
-            return location_of(stack)
-        del stack
-        COMPUTER.sleep(_PERIOD_S)
-    return ""
-
-
 async def end_callbacks(instance: Instance) -> None:
     """Wait a moment for the callbacks of an instance to return, then interrupt those that run."""
     loop = instance.context.loop
     until_s = loop.clock.monotonic() + _RETURN_WITHIN_S
-    while running_callbacks(instance) and loop.clock.monotonic() < until_s:
+    while any(_running(instance)) and loop.clock.monotonic() < until_s:
         await sleep(loop, _PERIOD_S)
     interrupt_callbacks(instance)
 
 
 def interrupt_callbacks(instance: Instance, function: UserFunction | None = None) -> None:
     """Interrupt the callbacks of an instance that have not returned, or one, and report each."""
-    for ident, call, name in running_callbacks(instance, function):
-        at = interrupt(instance, ident, call)
-        if (ident, name) not in instance.interrupted:
-            instance.interrupted.add((ident, name))
+    for callback, name in _running(instance, function):
+        at = callback.location()
+        callback.interrupt(CallAbandoned)
+        if (callback.thread, name) not in instance.interrupted:
+            instance.interrupted.add((callback.thread, name))
             where = f"; it is at {at}" if at else ""
             instance.context.log.warn(f"{name} is interrupted{where}")
 
 
-def running_callbacks(
+def _running(
     instance: Instance, function: UserFunction | None = None
-) -> list[tuple[int, FrameType, str]]:
-    """Return the callbacks that other threads run: the thread, the frame and the name of each."""
-    current = threading.get_ident()
-    found: list[tuple[int, FrameType, str]] = []
-    busy = stacks_of(ident for ident in instance.context.loop.busy_threads() if ident != current)
-    for ident, stack in busy.items():
-        with gc_paused():
-            called = [(frame, item) for frame in stack if (item := _function_of(frame)) is not None]
-        found += [
-            (ident, frame, item.__name__)
-            for frame, item in called
-            if item.is_one(instance, function)
-        ][:1]
-    return found
+) -> Iterator[tuple[RunningCallback, str]]:
+    """Yield the callbacks that other threads run, one for each thread, and their names."""
+    threads = set(instance.context.loop.busy_threads()) - {threading.get_ident()}
+    for callbacks in running_callbacks(threads):
+        for callback in callbacks:
+            with gc_paused():
+                item = next(filter(None, map(_function_of, callback.callers)), None)
+            if item is not None and item.is_one(instance, function):
+                yield callback, item.__name__
+                break
 
 
 def _function_of(frame: FrameType) -> UserFunction | None:
@@ -269,10 +244,8 @@ class ThreadedCall:
             return await self._done
         except Cancelled:
             self.location = self.find_location()
-            ident = self.thread.ident or 0
-            if not self._instance.end_wait(ident):
-                parts = self._instance, ident
-                threading.Thread(target=interrupt, args=parts, daemon=True).start()
+            for callbacks in running_callbacks((self.thread.ident or 0,)):
+                callbacks[0].interrupt(CallAbandoned)
             raise
 
     def find_location(self) -> str:
@@ -289,7 +262,6 @@ class ThreadedCall:
             self._done.set_exception(error)
 
 
-_ATTEMPTS = 50
 _PERIOD_S = 0.02
 #: How long a callback may go on when its node is cleaned up.
 _RETURN_WITHIN_S = 0.2

@@ -10,9 +10,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, PrimaryState
 from composer.plan import Fault, FaultKind
 from composer.runtime.callbacks.log import logger_name
+from composer.runtime.node.interruption import RunningCallback, running_callbacks
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.supervision.events import Stuck
-from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.main_queue import LoopRecovered, SupervisionContext
 from composer.runtime.supervision.node_set import NodeSet
 

@@ -16,12 +16,12 @@ from composer.runtime.executors.placement import place_threads
 from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.members.node import MemberNode
 from composer.runtime.metrics.figures import chain_figures, figures
+from composer.runtime.node.interruption import RunningCallback, running_callbacks
 from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameters import ParameterError
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
-from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.node_factory import NodeFactory
 
 _PRIMARY_STATES = {state.value: state for state in PrimaryState}

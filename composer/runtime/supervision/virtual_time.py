@@ -13,8 +13,8 @@ from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.clock.virtual import VirtualClock
 from composer.runtime.executors.stacks import is_library, location_of, outward
 from composer.runtime.intra_process.router import shared_channels
+from composer.runtime.node.interruption import RunningCallback, running_callbacks
 from composer.runtime.process import StartRefused
-from composer.runtime.supervision.interruption import RunningCallback, running_callbacks
 from composer.runtime.supervision.node_set import NodeSet
 from composer.runtime.supervision.outside_calls import outside_calls
 

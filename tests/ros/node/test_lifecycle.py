@@ -13,7 +13,7 @@ from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions
 from std_srvs.srv import Trigger
 
-from composer.runtime.supervision.interruption import CallbackInterrupted
+from composer.runtime.node.interruption import CallbackInterrupted
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SUBJECT = """

@@ -172,6 +172,17 @@ class Sleeper(Node):
         return response
 
 
+class CallerWithoutServer(Node):
+    """Waits for the response of a service that does not exist, in the callback of a timer."""
+
+    def __init__(self) -> None:
+        super().__init__("caller")
+        self.create_timer(0.01, self.on_timer)
+
+    def on_timer(self) -> None:
+        self.create_client(Trigger, "missing").call(Trigger.Request())
+
+
 class HangingTimer(Node):
     """A timer whose callback does not return, once it is commanded."""
 

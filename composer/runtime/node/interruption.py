@@ -15,6 +15,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.executors.base_loop import end_wait
 from composer.runtime.executors.stacks import (
     INTERRUPTIBLE,
     USER_CODE_CALLERS,
@@ -57,7 +58,7 @@ class RunningCallback:
     call: FrameType
     name: str
     in_transition: bool
-    _callers: Sequence[FrameType]  # from the frame that calls it, outward
+    callers: Sequence[FrameType]  # from the frame that calls it, outward
 
     def node(self, nodes: Iterable[ManagedNode]) -> ManagedNode | None:
         """Return the node among ``nodes`` that it belongs to. Call this once per callback.
@@ -67,7 +68,7 @@ class RunningCallback:
         """
         owners = {id(part): node for node in nodes for part in node.callback_owners}
         with gc_paused():
-            for frame in self._callers:
+            for frame in self.callers:
                 subject = frame.f_locals.get("self")
                 owner = owners.get(id(subject)) or owners.get(
                     id(getattr(subject, "_context", None))
@@ -86,11 +87,11 @@ class RunningCallback:
         stack = stacks_of((self.thread,)).get(self.thread, [])
         return location_of(stack[: stack.index(self.call)]) if self.call in stack else ""
 
-    def interrupt(self) -> None:
-        """Raise CallbackInterrupted in it, as soon as it runs Python code of the user.
+    def interrupt(self, kind: type[BaseException] = CallbackInterrupted) -> None:
+        """Raise ``kind`` in it, where it waits or as soon as it runs Python code of the user.
 
-        A callback that is always in code of the composer when its stack is sampled is not
-        interrupted.
+        In a function of C, such as ``time.sleep``, it is raised once that returns. A callback that
+        is always in code of the composer when its stack is sampled is not interrupted.
         """
         for _ in range(_ATTEMPTS):
             # After a sleep, this thread holds the GIL for 5 ms, so the sampled stack stays valid.
@@ -101,8 +102,10 @@ class RunningCallback:
             at = next(_callers(stack), None)
             if at is None or _plain_frame(stack[at:]) is not self.call:
                 continue
+            if end_wait(self.thread, kind):
+                return
             if not any(map(_is_composer, stack[:at])):
-                raise_in(self.thread, CallbackInterrupted)
+                raise_in(self.thread, kind)
                 return
 
 
