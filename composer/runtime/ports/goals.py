@@ -64,7 +64,7 @@ class GoalExecutor(RunningPort, Generic[G]):
         self._type = action_type
         self._handlers = handlers
         self._accepts = port.accept.holds if port.accept is not None else None
-        self._goals: dict[G, None] = {}
+        self._goals: dict[G, bool] = {}  # each of them true: popping is atomic
         self._limit = None if port.reentrant else port.qos.profile.queue_depth
         self._queue = queue_for(context, self._run, None, depth=None, reentrant=port.reentrant)
 
@@ -76,7 +76,7 @@ class GoalExecutor(RunningPort, Generic[G]):
         """Cancel the waiting goals and request cancellation of the running ones."""
         for goal in self._queue.clear():
             self._end(goal, None, canceled=True)
-        for goal in self._goals:
+        for goal in tuple(self._goals):
             goal.request_cancel()
 
     async def drain(self) -> None:
@@ -124,7 +124,7 @@ class GoalExecutor(RunningPort, Generic[G]):
     def _start(self, goal: G) -> None:
         """Execute an accepted goal, now or after the previous ones."""
         self._context.statistics.calls += 1
-        self._goals[goal] = None
+        self._goals[goal] = True
         self._queue.put(goal)
 
     # --- execution
@@ -197,9 +197,8 @@ class GoalExecutor(RunningPort, Generic[G]):
 
     def _end(self, goal: G, result: Any, *, canceled: bool) -> None:
         """Cancel or abort a goal that is still open, and send its result, once."""
-        if goal not in self._goals:
+        if not self._goals.pop(goal, False):
             return
-        del self._goals[goal]
         if goal.is_open:
             if canceled:
                 goal.canceled()
