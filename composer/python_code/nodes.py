@@ -13,7 +13,7 @@ from composer import behavior
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
 from composer.language.tree_values import is_opaque
-from composer.model import Node, Parameter, Port, PortKind, System
+from composer.model import Node, Port, PortKind, System
 from composer.model.resolve.parameters import rclpy_type
 from composer.project import Project
 from composer.python_code.lookup import BehaviorSource, find_behavior
@@ -118,21 +118,13 @@ class Handler:
     needed: bool
 
 
-def array_length(parameter: Parameter) -> int | None:
-    """Return the number of elements of a value; None if it is not a list, or not set."""
-    value = None if parameter.value is None else parameter.value.value
-    return len(value) if isinstance(value, list) else None
-
-
 def use_of(node: Node, source: BehaviorSource) -> tuple[object, ...]:
     """Return what a check of the Python code of a node depends on; equal uses are checked once."""
     place = (source.reference.text.value, source.reference.folder)
     if node.behavior is None:
         return place
     ports = tuple((port.kind, port.name.value, port.interface.value) for port in node.ports)
-    parameters = tuple(
-        (item.name.value, item.type.value, array_length(item)) for item in node.parameters
-    )
+    parameters = tuple((item.name.value, item.type.value) for item in node.parameters)
     timers = tuple(timer.name.value for timer in node.timers)
     return (*place, node.complete, ports, parameters, timers)
 

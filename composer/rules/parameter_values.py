@@ -1,15 +1,21 @@
-"""Types, ranges and choices of parameters."""
+"""Types, ranges, choices and lengths of parameters."""
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator
 from typing import Any
 
+from composer.base.characters import counted
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion
-from composer.base.source import Located
+from composer.base.fast_dataclass import dataclass
+from composer.base.source import Located, Span
 from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, Parameter, ParameterType
-from composer.rules.analysis.context import Context
+from composer.python_code.lookup import BehaviorSource
+from composer.python_code.syntax import scopes_in
+from composer.python_code.trees import dotted, span_of
+from composer.rules.analysis.context import Context, behaviors
 from composer.rules.analysis.formatting import and_others
 from composer.rules.analysis.parameters import (
     KNOWN_TYPES,
@@ -22,6 +28,7 @@ from composer.rules.analysis.parameters import (
     valid_values,
     wrong_choices,
 )
+from composer.rules.expressions import INDEX_OUT_OF_RANGE
 
 PARAMETER_VALUE = error("RC421", "parameter-value")
 PARAMETER_DECLARATION = error("RC425", "parameter-declaration")
@@ -170,3 +177,57 @@ def check_parameter_without_type(context: Context) -> Iterator[Diagnostic]:
                     parameter.default.span,
                     hint=f"write '{name}: {{type: ..., default: ...}}'",
                 )
+
+
+@dataclass(frozen=True, slots=True)
+class _Unpacking:
+    """Code that assigns an array parameter to several names; to no fewer, or to so many."""
+
+    parameter: str
+    names: int
+    is_least: bool
+    span: Span
+
+    def fits(self, length: int) -> bool:
+        """Return whether an array of this length can be assigned."""
+        return length >= self.names if self.is_least else length == self.names
+
+
+def check_unpacked_parameters(context: Context) -> Iterator[Diagnostic]:
+    """Check the lengths of arrays that a behavior assigns to several names."""
+    reported = ReportedValues()
+    by_source: dict[int, list[_Unpacking]] = {}
+    for node, source in behaviors(context):
+        if id(source) not in by_source:
+            by_source[id(source)] = list(_unpackings(source))
+        for unpacking in by_source[id(source)]:
+            parameter = node.parameter(unpacking.parameter)
+            value = parameter.value if parameter is not None else None
+            if parameter is None or value is None or not isinstance(value.value, list):
+                continue
+            length = len(value.value)
+            if not unpacking.fits(length) and reported.add(parameter, value):
+                least = "at least " if unpacking.is_least else ""
+                yield Diagnostic(
+                    INDEX_OUT_OF_RANGE,
+                    f"parameter '{parameter.name}' has {counted(length, 'element')}, but the "
+                    f"behavior assigns it to {least}{counted(unpacking.names, 'name')}",
+                    value.span,
+                    (Label(unpacking.span, "here"),),
+                )
+
+
+def _unpackings(source: BehaviorSource) -> Iterator[_Unpacking]:
+    for scope in scopes_in(source.classes):
+        if any(
+            isinstance(item, ast.Try) or getattr(item, "id", "") == "len" for item in scope.nodes
+        ):
+            continue  # the code may know
+        for item in scope.nodes:
+            match item:
+                case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Attribute() as array):
+                    owner, _, name = dotted(array).rpartition(".")
+                    starred = sum(isinstance(each, ast.Starred) for each in names)
+                    if owner == "self.parameters":
+                        span = span_of(array, scope.source)
+                        yield _Unpacking(name, len(names) - starred, starred > 0, span)

@@ -14,7 +14,6 @@ from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.lookup import BehaviorSource, imported_from, is_of_rclpy
 from composer.python_code.nodes import (
     UNDECLARED,
-    array_length,
     calls_on_self,
     declared_parameters,
     passes_node_on,
@@ -89,8 +88,6 @@ def _behavior_problems(code: Code) -> Iterator[Problem]:
             match node:
                 case ast.Subscript(value=ast.Attribute() as owner, slice=index):
                     yield from _key(dotted(owner), index, scope)
-                case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Attribute() as value):
-                    yield from _unpacked(names, value, scope)
                 case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
                     word = _word(left, scope)
                     problem = word.problem(scope.constant(right)) if word is not None else None
@@ -149,26 +146,6 @@ def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
     if isinstance(key, str) and key not in names:
         message = f"the node has no {kind} '{key}'"
         yield scope.problem(Family.PORT, message, index, suggestion(key, names))
-
-
-def _unpacked(names: list[ast.expr], array: ast.expr, scope: NodeScope) -> Iterator[Problem]:
-    """Yield the array parameters that are assigned to more or fewer names than they have."""
-    owner, _, name = dotted(array).rpartition(".")
-    is_own = owner == "self.parameters" and scope.class_ is not None
-    parameter = scope.code.node.parameter(name) if is_own else None
-    size = None if parameter is None else array_length(parameter)
-    if size is None or any(isinstance(node, ast.Try) or _is_len(node) for node in scope.nodes):
-        return  # the code may know
-    is_open = any(isinstance(item, ast.Starred) for item in names)
-    if size < len(names) - 1 if is_open else size != len(names):
-        elements = f"{size} element" + ("" if size == 1 else "s")
-        message = f"parameter '{name}' of node '{scope.code.node.name}' has {elements}"
-        hint = "change its value, or the code"
-        yield scope.problem(Family.INDEX, f"{message}, not {len(names)}", array, hint)
-
-
-def _is_len(node: ast.AST) -> bool:
-    return isinstance(node, ast.Name) and node.id == "len"
 
 
 def _word(node: ast.expr, scope: NodeScope) -> Word | None:
