@@ -153,7 +153,7 @@ def _merge_scenario(tree: Mapping, source: SourceFile, definitions: Definitions)
     tree, diagnostics = with_intended_sections(tree, kinds.SCENARIO)
     arguments = tuple(entry for entry in tree if entry.name == "arguments")
     others = tuple(entry for entry in tree if entry.name != "arguments")
-    expanded, found, _ = expand(Mapping(others, tree.span), {})  # a scenario declares no names
+    expanded, found, *_ = expand(Mapping(others, tree.span), {})  # a scenario declares no names
     tree = Mapping((*expanded, *arguments), tree.span)
     diagnostics += [*found, *check_schema(tree, kinds.SCENARIO)]
     project, folder = definitions.project, definitions.folder
@@ -200,6 +200,6 @@ def _merge_node_type(
     inherited = inherit(file)
     if inherited.tree is None:
         return Merged(diagnostics=inherited.diagnostics)
-    expanded, found, _ = expand(inherited.tree, arguments)
+    expanded, found, *_ = expand(inherited.tree, arguments)
     diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
     return Merged(inherited.tree, expanded, diagnostics, inherited.folders)

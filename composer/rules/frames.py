@@ -135,6 +135,7 @@ def _unconnected(tree: FrameTree, gap: Gap) -> Diagnostic:
 
 _PAIR = 2  # of trees
 _MAX_SEARCHED = 20  # roots that may be misspelled
+_MAX_COMPARED = 50_000  # names of frames
 
 
 def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:
@@ -146,7 +147,8 @@ def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:
         roots = tree.roots()
         others = [root for root in (*roots[1:], *roots[:1]) if root not in reported]
         if len(roots) > 1 and others:
-            meant = ((root, _meant_frame(tree, root, roots)) for root in others[:_MAX_SEARCHED])
+            searched = min(_MAX_SEARCHED, 1 + _MAX_COMPARED // len(tree.broadcasts))
+            meant = ((root, _meant_frame(tree, root, roots)) for root in others[:searched])
             root, close = next((item for item in meant if item[1]), (others[0], None))
             yield _several_trees(tree, roots, root, close)
 
@@ -161,7 +163,7 @@ def _meant_frame(tree: FrameTree, root: str, roots: tuple[str, ...]) -> str | No
         return tree.root(name) != root and (len(roots) == _PAIR or name in tree.by_child)
 
     close = nearest_parent(tree, root, is_possible)
-    children = (name for name in tree.by_child if is_possible(name) and is_typo(root, name))
+    children = (name for name in tree.by_child if is_typo(root, name) and is_possible(name))
     return close or next(children, None)
 
 

@@ -27,11 +27,15 @@ _MAX_CYCLE_NAMES = 8  # maximum number of names in a message
 
 
 class Expanded(NamedTuple):
-    """A file with its names expanded, the diagnostics, and the entries that are left out."""
+    """A file with its names expanded, the diagnostics, and the entries that are left out.
+
+    ``values`` is the number of keys and values.
+    """
 
     tree: Mapping
     diagnostics: list[Diagnostic]
     left_out: tuple[LeftOut, ...] = ()
+    values: int = 0
 
 
 def expand(tree: Mapping, given: Map[str, Entry]) -> Expanded:
@@ -62,7 +66,7 @@ def expand(tree: Mapping, given: Map[str, Entry]) -> Expanded:
     # An unknown variable may be meant to be the unused one.
     if not any(item.rule is rules.UNKNOWN_VARIABLE for item in problems):
         problems += _unused(scope)
-    return Expanded(expanded, problems, tuple(left_out))
+    return Expanded(expanded, problems, tuple(left_out), substitution.growth.values)
 
 
 def missing_names(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.document.limits import LimitedDiagnostics, Stopped, TooManyErrors
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
-from composer.language.tree import Entry, LeftOut, Mapping, count_values
+from composer.language.tree import Entry, LeftOut, Mapping
 from composer.language.tree_values import entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
@@ -46,7 +46,7 @@ class AssembledSystem:
     ``folders`` are the folders of all files and ``included`` the places that include them, by file
     name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
     ``diagnostics``. ``left_out`` are entries that conditions leave out, ``values`` the number of
-    keys and values of all files, as written and as merged. ``source`` is the file of the system.
+    keys and values of all files, as written and as expanded. ``source`` is the file of the system.
     """
 
     tree: Mapping | None
@@ -119,6 +119,6 @@ def _assembled(
         resolver.folders,
         included,
         resolver.left_out,
-        resolver.values + count_values(merged),
+        resolver.values,
         source,
     )

@@ -53,7 +53,7 @@ class IncludeResolver:
     ``is_partial`` is true if an included file is unavailable. ``folders`` are the folders of all
     files and ``included`` the places that include them, each once, by file name. ``left_out`` are
     the entries that conditions leave out of the file that was merged last, ``values`` the number of
-    keys and values of all files as written, counted each time that they are merged.
+    keys and values of all files as written and as expanded, each time that they are merged.
     """
 
     reader: IncludeReader
@@ -72,12 +72,12 @@ class IncludeResolver:
         Raises Stopped.
         """
         self.folders[file.source.path] = file.path.parent
-        self.values += count_values(file.tree)
         tree, misspelled = with_intended_sections(file.tree, SYSTEM)
         self.diagnostics += misspelled
-        expanded, found, left_out = expand(tree, arguments)
+        expanded, found, left_out, values = expand(tree, arguments)
+        self.values += count_values(file.tree) + values
         if self._stack:
-            self.limits.count("values", count_values(expanded), self._stack[-1].span)
+            self.limits.count("values", values, self._stack[-1].span)
             found += _missing(tree, arguments, self._stack[-1].span)
         found += _without_emptied(check_schema(expanded, SYSTEM), tree)
         self.diagnostics += found

@@ -83,7 +83,7 @@ class NodeTypeLoader:
     def _instantiate(
         self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Entry]
     ) -> InstantiatedNodeType:
-        expanded, found, _ = expand(tree, given)
+        expanded, found, *_ = expand(tree, given)
         found = [*found, *self._schema_diagnostics(path, expanded, given)]
         folders = SourceFolders(path.parent, written.folders, self.folders.node_types)
         declaration = declare(expanded, folders, self.qos, found)

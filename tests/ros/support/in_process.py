@@ -93,7 +93,7 @@ def system_of(text: str, folder: Path, **modules: str) -> System:
         folder.joinpath(f"{name}.py").write_text(dedent(content), encoding="utf-8")
     tree, source, diagnostics = parse_bytes(dedent(text).encode(), "system.yaml")
     assert tree is not None, diagnostics
-    expanded, more, _ = expand(tree, {})
+    expanded, more, *_ = expand(tree, {})
     diagnostics += more
     node_types = NodeTypes.of(Project.at(folder))
     system, more = resolve(expanded, source, node_types, folders={source.path: folder})

@@ -36,7 +36,7 @@ def resolve_text(
     """Resolve a text; node types are looked for in ``folder``."""
     tree = tree_of(text, "robot.yaml")
     source = tree.span.file
-    expanded, _, _ = expand(tree, {})
+    expanded, *_ = expand(tree, {})
     overrides, found = read_overrides(OverrideOptions(tuple(settings), namespace))
     system, more = resolve(
         expanded,

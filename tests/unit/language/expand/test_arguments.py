@@ -43,7 +43,7 @@ POSITIONS = ("simulation", "lidar", "rate", "robots", "map", "waypoints", "anyth
 )
 def test_a_value_gets_the_declared_type(name: str, written: str, value: object) -> None:
     given = {entry.name: entry for entry in tree_of(f"{name}: {written}")}
-    expanded, diagnostics, _ = expand(tree_of(DECLARED), given)
+    expanded, diagnostics, *_ = expand(tree_of(DECLARED), given)
     assert diagnostics == []
     result = plain(expanded.entries[-1].value)
     assert isinstance(result, list)
@@ -70,7 +70,7 @@ def test_a_wrong_value_is_reported_where_it_is_given(
     name: str, written: str, rule: str, message: str, hint: str
 ) -> None:
     tree = tree_of(f"{name}: {written}", "given")
-    _, [diagnostic], _ = expand(tree_of(DECLARED), {entry.name: entry for entry in tree})
+    _, [diagnostic], *_ = expand(tree_of(DECLARED), {entry.name: entry for entry in tree})
     assert (diagnostic.rule.name, diagnostic.primary.file.path) == (rule, "given")
     assert diagnostic.message.startswith(message)
     assert hint in (diagnostic.hint or "")
@@ -78,7 +78,7 @@ def test_a_wrong_value_is_reported_where_it_is_given(
 
 def test_a_default_has_to_be_a_choice_of_the_type() -> None:
     text = "system: s\narguments: {a: {type: integer, default: x}, b: {choices: [1], default: 2}}\n"
-    _, diagnostics, _ = expand(tree_of(f'{text}x: "${{a}} ${{b}}"'), {})
+    _, diagnostics, *_ = expand(tree_of(f'{text}x: "${{a}} ${{b}}"'), {})
     assert [(item.rule.name, quoted(item.primary)) for item in diagnostics] == [
         ("wrong-type", "x"),
         ("unknown-word", "2"),
@@ -115,7 +115,7 @@ x: "${simulation} ${lidar} ${robots} ${word} ${late}"
     ],
 )
 def test_a_condition_decides_what_is_there(conditions: str, names: str) -> None:
-    expanded, diagnostics, left_out = expand(tree_of(CONDITIONAL % conditions), {})
+    expanded, diagnostics, left_out, _ = expand(tree_of(CONDITIONAL % conditions), {})
     assert diagnostics == []
     nodes = expanded.get("nodes")
     assert nodes is not None
@@ -140,7 +140,7 @@ def test_a_condition_decides_what_is_there(conditions: str, names: str) -> None:
 def test_a_wrong_condition_is_reported_once(
     condition: str, rule: str, place: str | None, hint: str
 ) -> None:
-    _, diagnostics, _ = expand(tree_of(CONDITIONAL % f"if: {condition}"), {})
+    _, diagnostics, *_ = expand(tree_of(CONDITIONAL % f"if: {condition}"), {})
     [diagnostic] = {(item.rule.name, str(item.primary)): item for item in diagnostics}.values()
     assert diagnostic.rule.name == rule
     assert place is None or quoted(diagnostic.primary) == place
