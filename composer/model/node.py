@@ -253,6 +253,7 @@ class Node:
     unknown: tuple[UnknownKey, ...] = ()
     given: tuple[Located[str], ...] = field(default=(), compare=False)  # the keys of its entry
     complete: bool = True  # False: its type is unknown or invalid
+    full_name: str = field(init=False, repr=False, compare=False)  # in ROS
     #: The initial values of the parameters that have one, by name.
     initial_parameters: Mapping[str, object] = field(init=False, repr=False, compare=False)
     _ports: dict[str, Port] = field(init=False, repr=False, compare=False)
@@ -264,6 +265,8 @@ class Node:
             for parameter in self.parameters
             if parameter.value is not None
         }
+        full_name = join_node_name(self.namespace.value, self.ros_name.value)
+        object.__setattr__(self, "full_name", full_name)
         object.__setattr__(self, "initial_parameters", values)
         object.__setattr__(self, "_ports", by_name(self.ports))
         object.__setattr__(self, "_parameters", by_name(self.parameters))
@@ -297,11 +300,6 @@ class Node:
     def outside(self) -> Outside | None:
         """What implements the node outside the process; None if it runs in the process."""
         return self.external or self.executable or self.component
-
-    @property
-    def full_name(self) -> str:
-        """The full name of the node in ROS."""
-        return join_node_name(self.namespace.value, self.ros_name.value)
 
     def port(self, name: str) -> Port | None:
         """Return the port called ``name``, or None."""

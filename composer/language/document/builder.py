@@ -55,7 +55,7 @@ def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool
     if begin is None or end is None:
         return span_at(source, begin), False, 0
     row, start = begin.line, begin.column
-    line = source.line(row + 1)
+    line = source.lines[row] if row < len(source.lines) else ""
     if end.line != row or event.style in _BLOCK_STYLES:
         length = len(line.rstrip()) - start
         verbatim, offset = False, 0

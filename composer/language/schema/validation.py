@@ -50,6 +50,7 @@ class _Validator:
     _resolved: dict[int, _Resolved] = field(default_factory=dict)  # by the identity of the schema
 
     def errors(self, value: Any, schema: dict[str, Any], path: Path) -> Iterable[SchemaError]:
+        """Return the errors of a value: an empty list of most values, since a generator is slow."""
         found = self._resolved.get(id(schema))
         if found is None:
             found = self._resolved[id(schema)] = self._resolve(schema)
@@ -87,9 +88,9 @@ class _Validator:
     def properties(self, value: Any, schema: dict[str, Any], path: Path) -> Iterator[SchemaError]:
         if type(value) is dict:
             parts = schema["properties"]
-            for name in value:
-                if name in parts:
-                    yield from self.errors(value[name], parts[name], (*path, name))
+            for name, inner in value.items():
+                if name in parts and (found := self.errors(inner, parts[name], (*path, name))):
+                    yield from found
 
     def others(self, value: Any, schema: dict[str, Any], path: Path) -> Iterator[SchemaError]:
         """Check the keys that ``properties`` does not name."""

@@ -228,7 +228,9 @@ class EarlierErrors:
 
     def may_declare(self, node: str, *sections: str) -> bool:
         """Return whether a section of a node may declare more than the model contains."""
-        return not self.misspelled.isdisjoint((node, section) for section in sections)
+        return bool(self.misspelled) and not self.misspelled.isdisjoint(
+            (node, section) for section in sections
+        )
 
 
 def earlier_errors(context: Context) -> EarlierErrors:
