@@ -10,6 +10,7 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.base.source import Located, Span
+from composer.language.document.limits import MAX_ERRORS
 from composer.model import (
     Component,
     Executable,
@@ -93,9 +94,16 @@ def _has_ros(_: Context) -> bool:
     return has_ros_packages(os.environ)
 
 
-def _installed(_: Context) -> Callable[[str], bool]:
-    """Return whether a package is installed; many nodes may name the same one."""
-    return cache(lambda package: has_package(package, os.environ))
+def _installed(_: Context) -> Callable[[str], bool | None]:
+    """Return whether a package is installed; None of very many packages, to limit the time."""
+    looked_up: dict[str, bool] = {}
+
+    def is_installed(package: str) -> bool | None:
+        if package not in looked_up and len(looked_up) < MAX_ERRORS:
+            looked_up[package] = has_package(package, os.environ)
+        return looked_up.get(package)
+
+    return is_installed
 
 
 def _in_path(_: Context) -> Callable[[str], bool]:
@@ -129,7 +137,7 @@ def check_executable_not_installed(context: Context) -> Iterator[Diagnostic]:
                 yield Diagnostic(NOT_INSTALLED, f"program '{program}' is not in PATH", program.span)
         elif package is None or is_unresolved(package.value) or not context.once(_has_ros):
             continue
-        elif not context.once(_installed)(package.value):
+        elif context.once(_installed)(package.value) is False:
             yield Diagnostic(NOT_INSTALLED, f"package '{package}' is not installed", package.span)
 
 
@@ -237,7 +245,7 @@ def _plugin(context: Context, component: Component, plugin: Located[str]) -> Ite
                 plugin.span,
                 hint=suggestion(plugin.value, plugins),
             )
-        elif context.once(_has_ros) and not context.once(_installed)(package.value):
+        elif context.once(_has_ros) and context.once(_installed)(package.value) is False:
             text = f"package '{package}' is not installed"
             yield Diagnostic(NOT_INSTALLED, text, package.span)
 
