@@ -18,7 +18,7 @@ from weakref import ref
 
 from composer.base.source import Located
 from composer.runtime.executors.stacks import calls_user_code
-from composer.runtime.executors.strand import OuterCoroutine, Work, in_steps
+from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import BATCH_SIZE, CallbackStatistics
 
@@ -96,7 +96,7 @@ class CallbackTimer:
         self.last_s = began_s
         if continuation is not None:
             self._time_every(1)
-            return OuterCoroutine(self._timed_steps(continuation, duration_s), continuation)
+            return self._timed_steps(continuation, duration_s)
         batch = self._batch
         batch.append(duration_s)
         if len(batch) >= BATCH_SIZE:
@@ -122,18 +122,19 @@ class CallbackTimer:
         """Return ``coroutine`` with its steps timed, as one call."""
         if self._mutations is not None:
             coroutine = self._mutations.wrap_steps(str(self._statistics), coroutine)
-        if self.to_skip == inf:
-            return coroutine
-        return OuterCoroutine(self._timed_steps(coroutine, 0.0), coroutine)
+        return coroutine if self.to_skip == inf else self._timed_steps(coroutine, 0.0)
 
-    async def _timed_steps(self, coroutine: Coroutine[Any, Any, T], duration_s: float) -> T:
+    def _timed_steps(
+        self, coroutine: Coroutine[Any, Any, T], duration_s: float
+    ) -> Coroutine[Any, Any, T]:
         stopwatch = _Stopwatch(duration_s, self._monotonic)
-        try:
-            return await in_steps(stopwatch, coroutine)
-        finally:
+
+        def on_end() -> None:
             self._times.add(stopwatch.total_s)
             if stopwatch.total_s > self._budget_s:
                 self._on_overrun(stopwatch.total_s)
+
+        return in_steps(stopwatch, coroutine, on_end)
 
     def _on_overrun(self, duration_s: float) -> None:
         """Count a call that exceeds the budget, and warn unless there was a warning just before."""

@@ -83,10 +83,9 @@ class UserCode:
 
     def continuation(self, name: str, result: object) -> Coroutine[Any, Any, None] | None:
         """Return a coroutine that awaits a result of user code, or None if it is not awaitable."""
-        if not isinstance(result, Awaitable):
-            return None
-        rest = self._continue(name, result)
-        return OuterCoroutine(rest, result) if isinstance(result, Coroutine) else rest
+        if isinstance(result, Coroutine):
+            return OuterCoroutine(self._continue(name, result), result)
+        return self._continue(name, result) if isinstance(result, Awaitable) else None
 
     @calls_user_code
     async def _continue(self, name: str, result: Awaitable[Any]) -> None:

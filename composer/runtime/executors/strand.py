@@ -125,9 +125,16 @@ class StepScope(Protocol):
         """End the step."""
 
 
-def in_steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-    """Return a coroutine that runs each step of ``coroutine``, up to its next wait, in scope."""
-    return OuterCoroutine(_steps(scope, coroutine), coroutine)
+def in_steps(
+    scope: StepScope,
+    coroutine: Coroutine[Any, Any, T],
+    on_end: Callable[[], None] | None = None,
+) -> Coroutine[Any, Any, T]:
+    """Return a coroutine that runs each step of ``coroutine``, up to its next wait, in scope.
+
+    ``on_end()`` is called at its end if it has begun.
+    """
+    return OuterCoroutine(_steps(scope, coroutine, on_end), coroutine)
 
 
 def as_a_whole(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
@@ -186,7 +193,9 @@ class OuterCoroutine(Coroutine[Any, Any, T]):
 
 
 @calls_user_code
-def _steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Generator[Any, Any, T]:
+def _steps(
+    scope: StepScope, coroutine: Coroutine[Any, Any, T], on_end: Callable[[], None] | None = None
+) -> Generator[Any, Any, T]:
     raised: BaseException | None = None
     try:
         while True:
@@ -206,8 +215,12 @@ def _steps(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Generator[Any
                 raise
             except BaseException as error:
                 raised = error
-    finally:
+    except BaseException:
         coroutine.close()
+        raise
+    finally:
+        if on_end is not None:
+            on_end()
 
 
 def _enter(scope: StepScope) -> Generator[Any, Any, None]:
