@@ -197,7 +197,7 @@ def test_a_slow_asynchronous_handler_is_canceled(tmp_path: Path, urgent: bool) -
         took_s = time.monotonic() - stopped_s
     assert took_s < 20.0
     assert outcome.exit_code == 1
-    assert not outcome.hung
+    assert not outcome.hung, [str(event) for event in system.events]
     assert system.reported(Stuck)[0].node == "/planning/planner"
     assert "/control/motor inactive" in system.states()
 
