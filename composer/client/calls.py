@@ -74,7 +74,7 @@ def call_service(session: Session, deadline: Deadline, request: ServiceRequest) 
             deadline = Deadline(deadline.timeout_s)
 
 
-class _ActionClient(ActionClient):
+class GoalClient(ActionClient):
     """Takes all feedback before the result: rclpy drops the feedback that is left after it.
 
     If another thread destroys it, the executor gets InvalidHandle, as for other entities.
@@ -157,7 +157,7 @@ def send_goal(session: Session, deadline: Deadline, request: GoalRequest) -> Ite
     name = request.name
     action = class_of(request.type_name, "action")
     message = build_message(request.goal, action.Goal, "the goal")
-    client = _ActionClient(session.node, action, name)
+    client = GoalClient(session.node, action, name)
     try:
         is_ready = session.wait_for(
             lambda: client.server_is_ready() or request.should_stop() or None, deadline

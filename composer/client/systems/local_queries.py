@@ -100,7 +100,7 @@ def with_callbacks_of_processes(reports: Mapping[str, SystemReport]) -> dict[str
 #: Longer than a manager waits for its view to become complete.
 RESPONSE_S = 0.6
 #: The endpoints of the largest systems: discovering the graph takes longer.
-_ENDPOINTS_S = 1.0
+ENDPOINTS_S = 1.0
 _STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
 _LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
 _MANAGER_SERVICE = "/manager/is_active"
@@ -147,7 +147,7 @@ def local_endpoints() -> tuple[Mapping[str, tuple[ObservedEndpoint, ...]], list[
 
     A name that two nodes share is listed twice.
     """
-    answer: EndpointsAnswer | None = _ask_any(EndpointsQuery(), _ENDPOINTS_S, _ENDPOINTS_S)
+    answer: EndpointsAnswer | None = _ask_any(EndpointsQuery(), ENDPOINTS_S, ENDPOINTS_S)
     return None if answer is None else (answer.endpoints, list(answer.nodes))
 
 

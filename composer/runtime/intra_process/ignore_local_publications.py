@@ -30,7 +30,7 @@ _POLL_PERIOD_S = 0.0005
 TEST_NODE = "_compose_trial"
 
 
-class _Options(ctypes.Structure):
+class RmwSubscriptionOptions(ctypes.Structure):
     """``rmw_subscription_options_t``."""
 
     _fields_ = (
@@ -41,14 +41,14 @@ class _Options(ctypes.Structure):
     )
 
 
-class _Subscription(ctypes.Structure):
+class RmwSubscription(ctypes.Structure):
     """``rmw_subscription_t``."""
 
     _fields_ = (
         ("implementation_identifier", ctypes.c_char_p),
         ("data", ctypes.c_void_p),
         ("topic_name", ctypes.c_char_p),
-        ("options", _Options),
+        ("options", RmwSubscriptionOptions),
         ("can_loan_messages", ctypes.c_bool),
         ("is_cft_enabled", ctypes.c_bool),
     )
@@ -69,7 +69,7 @@ def ignore_local(subscription: Subscription) -> None:
         address = _RCL.rcl_subscription_get_rmw_handle(subscription.handle.pointer)
         if not address:
             raise NotSupported("rcl has no rmw handle of the subscription")
-        rmw_subscription = _Subscription.from_address(address)
+        rmw_subscription = RmwSubscription.from_address(address)
         topic = rmw_subscription.topic_name.decode()
         if topic != subscription.topic_name:
             raise NotSupported(f"rmw's subscription of '{subscription.topic_name}' has '{topic}'")

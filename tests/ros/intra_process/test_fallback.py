@@ -18,8 +18,8 @@ from std_msgs.msg import Int64
 
 from composer.runtime.intra_process import match_flag
 from composer.runtime.intra_process.ignore_local_publications import (
-    _Options,
-    _Subscription,
+    RmwSubscription,
+    RmwSubscriptionOptions,
     unsupported_reason,
 )
 from tests.ros.support.commands import COMPOSE
@@ -130,8 +130,8 @@ def preloaded(middleware: str | None, folder: Path) -> Iterator[None]:
 def test_the_offsets_of_fields_are_those_of_the_headers(tmp_path: Path) -> None:
     program = compiled("print_layout.c", tmp_path / "print_layout")
     printed = subprocess.run([program], capture_output=True, check=True, text=True).stdout
-    flag = _Subscription.options.offset + _Options.ignore_local_publications.offset
-    ours = (_Subscription.topic_name.offset, flag, ctypes.sizeof(_Subscription))
+    flag = RmwSubscription.options.offset + RmwSubscriptionOptions.ignore_local_publications.offset
+    ours = (RmwSubscription.topic_name.offset, flag, ctypes.sizeof(RmwSubscription))
     assert tuple(map(int, printed.split())) == ours
 
 

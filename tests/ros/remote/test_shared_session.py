@@ -10,7 +10,7 @@ from composer_interfaces.action import Navigate
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.client.calls import _ActionClient
+from composer.client.calls import GoalClient
 from composer.client.session import Deadline, Session
 from composer.client.shared_session import InvalidHandle, SharedSession
 from tests.ros.support.in_process import Peer, wait_until
@@ -95,7 +95,7 @@ def test_a_callback_that_raises_is_logged_and_ends_nothing(
 def test_an_action_client_may_end_when_the_executor_is_about_to_wait() -> None:
     """It is then still in the list of what the executor waits for."""
     with Session() as session:
-        client = _ActionClient(session.node, Navigate, "/navigate")
+        client = GoalClient(session.node, Navigate, "/navigate")
         client.destroy()
         session.node.add_waitable(client)
         with pytest.raises(InvalidHandle):

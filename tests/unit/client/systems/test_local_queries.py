@@ -42,7 +42,7 @@ def answers(
 ) -> Iterator[dict[Any, Any]]:
     """The answers of the running system /robot, by query."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("run")))
-    for limit in ("RESPONSE_S", "_ENDPOINTS_S"):  # what takes longer is not an answer
+    for limit in ("RESPONSE_S", "ENDPOINTS_S"):  # what takes longer is not an answer
         monkeypatch.setattr(local_queries, limit, LIMIT_S)
     found: dict[Any, Any] = {EndpointsQuery: None}
     found |= {GraphQuery: GraphAnswer(VIEW), NodesQuery: NodesAnswer(("/a",))}
