@@ -119,7 +119,7 @@ def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         check=False,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=100,
     )
 
 
@@ -149,7 +149,7 @@ def test_a_removed_working_directory_is_reported(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=30,
+        timeout=100,
     )
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "compose: the current working directory does not exist anymore\n"
@@ -163,7 +163,7 @@ def test_python_m_composer_imports_nothing_from_the_current_folder(tmp_path: Pat
         capture_output=True,
         text=True,
         check=False,
-        timeout=30,
+        timeout=100,
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("compose ")

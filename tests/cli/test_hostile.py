@@ -55,7 +55,7 @@ def validate(folder: Path, *arguments: str) -> Result:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         pass_fds=(write,),
-        timeout=30,
+        timeout=150,  # its CPU time has a limit of its own
         check=False,
     )
     os.close(write)

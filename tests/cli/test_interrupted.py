@@ -20,7 +20,7 @@ TIMES = 6
 INTERRUPTED = 130
 PACKAGE = Path(composer.__file__).parent
 COMPOSE = Path(sys.executable).with_name("compose")
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 @pytest.mark.slow

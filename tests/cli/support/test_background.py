@@ -90,7 +90,7 @@ except CommandError as error:
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 def test_without_a_folder_for_the_log_the_variables_are_named() -> None:
     command = [sys.executable, "-c", WITHOUT_HOME]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
     assert done.stdout == (
         "there is no folder for the log: neither ROS_LOG_DIR nor HOME is set, and user 4242 has no"
         " home folder\nset ROS_LOG_DIR to a writable folder\n"

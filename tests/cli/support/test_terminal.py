@@ -22,7 +22,7 @@ write("more data")
 
 def test_output_of_libraries_goes_to_stderr() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", NOISY], capture_output=True, text=True, check=True, timeout=30
+        [sys.executable, "-c", NOISY], capture_output=True, text=True, check=True, timeout=100
     )
     assert done.stdout == "data\nmore data\n"
     assert done.stderr == "noise of a library\ntalk\n"
@@ -36,6 +36,6 @@ def test_messages_that_cannot_be_written_do_not_change_the_exit_code(target: str
         reading, writing = os.pipe()
         os.close(reading)
     command = [sys.executable, "-m", "composer", "validate", "no_such_file.yaml"]
-    done = subprocess.run(command, stderr=writing, check=False, timeout=30)
+    done = subprocess.run(command, stderr=writing, check=False, timeout=100)
     os.close(writing)
     assert done.returncode == 2

@@ -39,7 +39,7 @@ def test_programs_run_only_when_requested() -> None:
     def states() -> list[str]:
         return [state for process, state in states_of_children().items() if process not in before]
 
-    with PausedPrograms(BOTH, os.environ, timeout_s=20.0) as held:
+    with PausedPrograms(BOTH, os.environ, timeout_s=60.0) as held:
         wait_until(lambda: states() == [STOPPED, STOPPED], "both stopped")
         held.work(2.0)
         wait_until(lambda: states() == [STOPPED, STOPPED], "both stopped again")

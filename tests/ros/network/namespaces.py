@@ -23,7 +23,7 @@ import pytest
 
 from tests.programs import require
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 _UNSHARE = ("unshare", "--net", "--mount", "--uts", "--pid", "--fork")
 #: Private to each computer: runtime folder, temporary files, home and logs are below it.
 RUN = Path("/run")

@@ -14,7 +14,7 @@ from tests.ros.network.namespaces import Computer
 from tests.ros.network.ssh_servers import SshKeys
 
 COMPOSE = (sys.executable, "-P", "-m", "composer")
-PATIENCE_S = 40.0
+PATIENCE_S = 60.0
 #: On each computer, below what is private to it.
 WORKSPACE = "/run/robot"
 _DETECTOR = """

@@ -12,7 +12,7 @@ import pytest
 
 from tests.ros.support.commands import COMPOSE
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 #: Functions of rcl that never return, with the GIL held, if a variable names them.
 HANGING_RCL = """
 #define _GNU_SOURCE

@@ -174,7 +174,7 @@ def test_memory_is_flat_after_the_first_fifth(share: float) -> None:
         "soak",
         "--share",
         str(share),
-        timeout_s=50.0 if share < 1.0 else 880.0,
+        timeout_s=150.0 if share < 1.0 else 880.0,
         variables=os.environ,  # the ROS domain of this test
     )
     assert figures["messages"] >= share * 10_000_000

@@ -33,8 +33,10 @@ from composer.bags.definitions import full_definition
 from composer.bags.editing import Selection, write_bag
 from composer.bags.reader import open_bag
 from composer.bags.writer import BagWriter, SplitLimits
+from composer.cli.support.bags import bag_errors
 from composer.interfaces import Interfaces
 from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile
+from composer.runtime.process import watchdog
 
 TYPES = (
     "std_msgs/msg/String",
@@ -249,6 +251,22 @@ def test_a_signal_leaves_no_decompressed_file(tmp_path: Path, number: int) -> No
     assert "KeyboardInterrupt" in done.stderr
     assert done.stdout == ""
     assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_signals_of_one_moment_are_one_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linux repeats the signal of a parent's end for each of its threads."""
+    monkeypatch.setattr(watchdog, "SAME_REQUEST_S", 60.0)
+    before, requests = signal.signal(signal.SIGTERM, signal.SIG_DFL), 0
+    try:
+        with bag_errors():
+            for _ in range(2):
+                try:
+                    signal.raise_signal(signal.SIGTERM)
+                except KeyboardInterrupt:
+                    requests += 1
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert requests == 1
 
 
 def _compress_messages(bag: Path, add_size: bool) -> None:

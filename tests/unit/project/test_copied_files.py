@@ -150,7 +150,7 @@ def test_rsync_copies_exactly_what_is_listed(tmp_path: Path) -> None:
     patterns = "".join(f"{pattern}\0" for pattern in files.rsync_patterns)
     write(there, {".venv/x": "", "sub/.env": "", "old": ""})
     command = ["rsync", "-r", "--delete", "--from0", "--exclude-from=-", f"{root}/", str(there)]
-    subprocess.run(command, check=True, input=patterns, text=True, timeout=30)
+    subprocess.run(command, check=True, input=patterns, text=True, timeout=100)
     copied = {str(path.relative_to(there)) for path in there.rglob("*") if path.is_file()}
     assert set(files.copied) == {"sub/ab", ".env.example"} | {f"{name}x" for name in odd}
     assert copied == {*files.copied, ".venv/x", "sub/.env"}  # what only the other computer has
