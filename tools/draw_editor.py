@@ -63,12 +63,13 @@ def ask() -> Answers:
             compose(["stubs"])
         server = LanguageServer(SERVER, folder, _SETTINGS)
         try:
-            return _answers(server, folder / "nodes/shown.py")
+            return answers(server, folder / "nodes/shown.py")
         finally:
             server.close()
 
 
-def _answers(server: LanguageServer, path: Path) -> Answers:
+def answers(server: LanguageServer, path: Path) -> Answers:
+    """Return what a server says about the behavior as ``path``, in a project with these stubs."""
     cursor = server.open_python(path, _CODE)
     names = [name for name in server.complete(cursor) if not name.startswith("_")]
     offered = {}
@@ -90,10 +91,10 @@ def _errors(server: LanguageServer, cursor: Cursor) -> Iterator[tuple[int, tuple
             yield start["line"], (start["character"], end["character"], message)
 
 
-def draw(answers: Answers) -> str:
+def draw(said: Answers) -> str:
     """Return the picture as SVG."""
     lines = _CODE.replace("|", "").splitlines()
-    height = _TOP + _LINE * (len(lines) + len(answers.offered)) + 26
+    height = _TOP + _LINE * (len(lines) + len(said.offered)) + 26
     shapes = [
         f'<rect width="{_WIDTH}" height="{height}" rx="8" fill="#ffffff" stroke="#d0d7de"/>',
         _text(16, 24, "nodes/motor_controller.py", _GRAY),
@@ -102,10 +103,10 @@ def draw(answers: Answers) -> str:
     for number, line in enumerate(lines):
         y = _y(number)
         shapes += [_text(_LEFT - 28, y, str(number + 1), _GRAY), _code(line, y)]
-    for number, (start, end, message) in answers.errors.items():
+    for number, (start, end, message) in said.errors.items():
         shapes += [_squiggle(start, end, _y(number) + 4)]
         shapes += [_text(_x(len(lines[number]) + 3), _y(number), message, _RED)]
-    shapes += _list(answers.offered, len(lines[-1]), len(lines))
+    shapes += _list(said.offered, len(lines[-1]), len(lines))
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" width="{_WIDTH}" '
         f'height="{height}" font-family="DejaVu Sans Mono, Menlo, Consolas, monospace" '

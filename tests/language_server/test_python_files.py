@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
+from tests.cli.compose import compose
 from tests.language_server.client import Cursor, LanguageServer
 from tests.language_server.robot import MISTAKES, RIGHT, make_project, wrong_lines
 from tests.programs import require_package
-from tools.draw_editor import PICTURE, ask, draw
+from tools.draw_editor import PICTURE, ROOT, answers, draw
 
 HERE = Path(__file__).parent
 SERVER = HERE / "node_modules/basedpyright/langserver.index.js"
@@ -25,7 +27,11 @@ OF_MESSAGES = {"SLOT_TYPES", "get_fields_and_field_types"}
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("python")
     with chdir(folder):
-        return make_project(folder)
+        root = make_project(folder)
+    for part in ("nodes", "interfaces"):  # for the picture; a server takes seconds to start
+        shutil.copytree(ROOT / part, root / part, dirs_exist_ok=True)
+    assert compose("stubs", str(root)).code == 0
+    return root
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +98,8 @@ def test_mistakes_are_reported_and_nothing_else(server: LanguageServer, root: Pa
     assert sorted(errors) == wrong_lines(MISTAKES)
 
 
-def test_the_picture_in_the_guide_shows_what_the_server_answers() -> None:
-    require_package(HERE, "basedpyright")
-    assert draw(ask()) == PICTURE.read_text(encoding="utf-8"), "run: make pictures"
+def test_the_picture_in_the_guide_shows_what_the_server_answers(
+    server: LanguageServer, root: Path
+) -> None:
+    picture = draw(answers(server, root / "nodes/shown.py"))
+    assert picture == PICTURE.read_text(encoding="utf-8"), "run: make pictures"
