@@ -249,7 +249,7 @@ def test_many_lives_leave_nothing_behind(tmp_path: Path) -> None:
     with running(text, tmp_path) as system:
         live(system)
         before = counts()
-        for _ in range(40):
+        for _ in range(15):
             live(system)
         wait_until(lambda: counts() == before, f"{counts()} instead of {before}")
         assert before[0] == 3
