@@ -139,15 +139,6 @@ class Browser:
         assert "ok" in reply, reply
         return reply["ok"]
 
-    def ok_when(self, fits: Callable[[Any], Any], op: str, **values: Any) -> Any:
-        """Repeat a request that changes nothing until its result fits; return that."""
-        end_s = time.monotonic() + PATIENCE_S
-        while True:
-            result = self.ok(op, **values)
-            if fits(result):
-                return result
-            assert time.monotonic() < end_s, result
-
     def error(self, op: str, **values: Any) -> Message:
         """Return the error of a request that must fail."""
         reply = self.request(op, **values)
