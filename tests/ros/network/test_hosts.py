@@ -45,7 +45,6 @@ def split(
         yield system, keys
 
 
-@pytest.mark.timeout(120)
 def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
     with split(tmp_path, "robot", trusted=False) as (system, keys):
         (robot,) = system.others
@@ -114,7 +113,6 @@ exit 1
 MOST_CHARACTERS = 5000
 
 
-@pytest.mark.timeout(120)
 def test_a_host_whose_every_command_is_hostile(tmp_path: Path) -> None:
     program = tmp_path / "hostile"
     program.write_text(HOSTILE)
@@ -135,7 +133,6 @@ def test_a_host_whose_every_command_is_hostile(tmp_path: Path) -> None:
                 assert len(output) < MOST_CHARACTERS
 
 
-@pytest.mark.timeout(120)
 def test_the_second_signal_ends_all_at_once(tmp_path: Path) -> None:
     with split(tmp_path, "robot") as (system, _), system.up() as up:
         up.wait_for("3 of 3 nodes active")

@@ -6,8 +6,6 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 _LOAD = """
 import os, sys
 from composer.runtime.process.libraries import loading_libraries
@@ -38,16 +36,13 @@ def _output(program: str, **environment: str) -> str:
     ).stdout.strip()
 
 
-@pytest.mark.timeout(120)
 def test_the_libraries_of_rclpy_are_loaded_before_it_is_imported() -> None:
     assert _output(_LOAD, RMW_IMPLEMENTATION="") == "True"
 
 
-@pytest.mark.timeout(120)
 def test_with_a_selected_middleware_nothing_is_loaded_that_may_end_the_process() -> None:
     assert _output(_LOAD, RMW_IMPLEMENTATION="rmw_nothing") == "False"
 
 
-@pytest.mark.timeout(120)
 def test_type_support_is_loaded_without_the_generator_of_message_classes() -> None:
     assert _output(_TYPE_SUPPORT) == "False True"
