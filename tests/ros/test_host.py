@@ -99,7 +99,9 @@ def test_a_failing_bring_up_is_rolled_back_in_reverse(
 
 def test_a_system_stops_after_its_run_time(tmp_path: Path) -> None:
     limits: list[float | None] = []
-    options = HostOptions(run_for_s=0.3, bring_up_within_s=30.0, end_within=limits.append)
+    options = HostOptions(
+        run_for_s=0.3, bring_up_within_s=30.0, stop_within_s=20.0, end_within=limits.append
+    )
     system = RunningSystem(system_of(CHAIN, tmp_path, planner=WELL), options, None)
     outcome = system.end()
     assert (outcome.exit_code, outcome.reason) == (0, "--for elapsed")
@@ -131,7 +133,8 @@ nodes:
 def test_a_hanging_callback_does_not_delay_the_end(tmp_path: Path, peer: Peer, kind: str) -> None:
     text = HANGING.replace("KIND", kind)
     module = HANG.format(handler="on_tick")
-    with running(text, tmp_path, options=HostOptions(), planner=module) as system:
+    options = HostOptions(stop_within_s=3.0)
+    with running(text, tmp_path, options=options, planner=module) as system:
         system.wait_for_log("hanging")
         peer.call(Trigger, "/trigger")  # the other executor still works
         began_s = time.monotonic()

@@ -226,7 +226,8 @@ def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) ->
         assert "process" in str(refusal.value)
         assert "compose down /fleet/robot" in refusal.value.hint
         assert peer.state("/fleet/planner") == "active"
-    again = RunningSystem(system_of(ROBOT, tmp_path), HostOptions(run_for_s=0.1), None)
+    options = HostOptions(run_for_s=0.1, stop_within_s=20.0)
+    again = RunningSystem(system_of(ROBOT, tmp_path), options, None)
     assert again.end().exit_code == 0
 
 

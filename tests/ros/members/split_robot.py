@@ -76,7 +76,7 @@ def split(
     path = folder / "robot.yaml"
     path.write_text(text, encoding="utf-8")
     options = HostOptions(
-        stop_within_s=6.0,
+        stop_within_s=20.0,
         member_command=command_of(path),
         fail_on_error=fail_on_error,
         all_or_nothing=all_or_nothing,

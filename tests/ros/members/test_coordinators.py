@@ -202,7 +202,9 @@ def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
     """It may belong to a process that is about to end with an earlier coordinator."""
     with hold_instance_lock("/lab/robot/sensing"):
         (tmp_path / "robot.yaml").write_text(TEXT, encoding="utf-8")
-        options = HostOptions(stop_within_s=6.0, member_command=command_of(tmp_path / "robot.yaml"))
+        options = HostOptions(
+            stop_within_s=20.0, member_command=command_of(tmp_path / "robot.yaml")
+        )
         system = RunningSystem(system_of(TEXT, tmp_path, detector=DETECTOR), options, None)
         wait_until(lambda: len(system.host.nodes) == 3, "the nodes")
         wait_until(lambda: system.node("detector").pid, "the start of the other process")

@@ -111,7 +111,7 @@ def test_a_bring_up_is_rolled_back(tmp_path: Path, policy: str, together: bool) 
 
 
 def test_all_or_nothing_is_not_about_nodes_that_are_not_required(tmp_path: Path) -> None:
-    options = HostOptions(all_or_nothing=True)
+    options = HostOptions(all_or_nothing=True, stop_within_s=20.0)
     text = robot("isolate", required="false")
     with running(text, tmp_path, options=options, driver=DRIVER) as system:
         wait_until(lambda: system.reported(NodeFailed), "the failure")
