@@ -259,7 +259,7 @@ def test_every_fault_in_every_callback(tmp_path: Path, peer: Peer) -> None:
     alone.write_text(METRONOME, encoding="utf-8")
     with (
         RunningSystem(str(alone), "--autostart", "active", "--namespace", CONTROL) as control,
-        RunningSystem(str(path), "--autostart", "active") as system,
+        RunningSystem(str(path), "--autostart", "active", "--grace", "60") as system,
     ):
         for running in (control, system):
             running.wait_for("nodes active after")
