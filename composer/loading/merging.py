@@ -179,8 +179,9 @@ def _system_path(name: Tree, folder: Path, project: Project) -> Tree:
 
 def _surplus_entry(tree: Mapping) -> Diagnostic | None:
     """Return the diagnostic for a section of a file, or of one of its nodes, with many entries."""
-    inner = (section for node in entries(tree.get("nodes")) for section in entries(node.value))
-    for section in chain(tree, inner):
+    inner = [section for node in entries(tree.get("nodes")) for section in entries(node.value)]
+    frames = (part for item in inner if item.name == "transforms" for part in entries(item.value))
+    for section in chain(tree, inner, frames):
         match section.value:
             case Mapping(entries=own) if len(own) > MAX_ENTRIES:
                 span = own[MAX_ENTRIES].key.span

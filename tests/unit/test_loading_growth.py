@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from composer.loading import load, load_bytes
-from tests.unit.support.growth import assert_linear
+from tests.unit.support.growth import assert_fast, assert_linear
 
 SMALL, LARGE = 50, 400
 #: From 500 names on, each comparison takes longer, by a constant. Comparing names is fast.
@@ -223,6 +223,12 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
     "frames": ("nodes:\n  x:\n    transforms:\n      static:\n", "        f#: {parent: g#}\n", ""),
     "missing includes": ("nodes: {x: {}}\ninclude:\n", "  - no#.yaml\n", ""),
     "missing modules": ("nodes:\n", "  n#: {behavior: no_module#:Node}\n", ""),
+    "many ports": (
+        "nodes:\n",
+        f"  n#: {{publishers: {{a: {{{STRING}}}, b: {{{STRING}}}, c: {{{STRING}}}}}, "
+        f"subscriptions: {{d: {{{STRING}}}, e: {{{STRING}}}, f: {{{STRING}}}}}}}\n",
+        "",
+    ),
     "one topic": (
         "nodes:\n",
         f"  n#: {{publishers: {{p: {{{STRING}, topic: /t}}}}, "
@@ -230,6 +236,12 @@ LARGE_FILES: dict[str, tuple[str, str, str]] = {
         "",
     ),
 }
+
+
+def large_file(begin: str, part: str, end: str, size: int) -> bytes:
+    count = size // len(part.replace("#", "10000"))
+    parts = "".join(part.replace("#", str(number)) for number in range(count))
+    return f"system: large\n{begin}{parts}{end}".encode()
 
 
 @pytest.mark.slow
@@ -249,13 +261,23 @@ def test_large_files(
     """Also beyond the limits."""
 
     def validate(size: int) -> None:
-        parts = size // len(part.replace("#", "10000"))
-        text = "".join(part.replace("#", str(number)) for number in range(parts))
-        content = f"system: large\n{begin}{text}{end}".encode()
-        load_bytes(content, tmp_path, shown="large.yaml")
+        load_bytes(large_file(begin, part, end, size), tmp_path, shown="large.yaml")
 
     for small, large in pairwise(sizes):
         assert_linear(validate, small, large)
+
+
+#: Two seconds of a processor that runs the fixed loop in 0.041 s.
+LOOPS_PER_MEGABYTE = 2.0 / 0.041
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(("begin", "part", "end"), LARGE_FILES.values(), ids=LARGE_FILES)
+def test_the_time_for_a_megabyte(tmp_path: Path, begin: str, part: str, end: str) -> None:
+    content = large_file(begin, part, end, 1_000_000)
+    load_bytes(large_file(begin, part, end, 1_000), tmp_path, shown="small.yaml")
+    assert_fast(lambda: load_bytes(content, tmp_path, shown="large.yaml"), LOOPS_PER_MEGABYTE)
 
 
 SECTION = "/n#: {ros__parameters: {a: 1}}\n"
@@ -300,6 +322,7 @@ def test_large_scenarios(tmp_path: Path, section: str, part: str) -> None:
 
 NODE_TYPE = "node: big\npublishers:\n" + "".join(f"  p{n}: {{{STRING}}}\n" for n in range(400))
 PARAMETERS = ", ".join(f"a{number}: 1" for number in range(5_001))
+FRAMES = ", ".join(f"f{number}: {{parent: map}}" for number in range(5_001))
 LOG = f"log: '{{{' + '.join(['1'] * 30)}}}'"
 TOO_MANY_VALUES = (
     "with this node, the nodes declare more than 400,000 values, counting expressions by "
@@ -311,6 +334,7 @@ TOO_MANY_VALUES = (
     ("nodes", "message"),
     [
         (f"x: {{parameters: {{{PARAMETERS}}}}}", "'parameters' has more than 5,000 entries"),
+        (f"x: {{transforms: {{static: {{{FRAMES}}}}}}}", "'static' has more than 5,000 entries"),
         (
             f"n${{i}}: {{for_each: {{i: 5000}}, timers: {{t: {{rate_hz: 1, {LOG}}}}}}}",
             TOO_MANY_VALUES,
