@@ -21,7 +21,7 @@ from composer.language.rules import UNUSED_DECLARATION
 from composer.model import DEFAULT_EXECUTOR, Executor, ExecutorKind, Node, Port, Timer
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.formatting import number
-from composer.rules.analysis.rates import Cause, Rates, rates
+from composer.rules.analysis.rates import Cause, rates
 from composer.rules.analysis.subjects import earlier_errors, used_parameters
 from composer.rules.references import unknown_names
 
@@ -226,13 +226,12 @@ def executor_loads(context: Context) -> tuple[ExecutorLoad, ...]:
     The callbacks of a node run one at a time unless they are reentrant. So on an executor with
     several threads, each node has a load of its own as well.
     """
-    known = context.once(rates)
     declared = {executor.name.value: executor for executor in context.system.executors}
     shares: dict[str, list[CallbackLoad]] = {}
     found = []
     for node in context.system.nodes:
         name = node.executor.value if node.executor is not None else DEFAULT_EXECUTOR
-        of_node = tuple(_shares(known, node))
+        of_node = tuple(_shares(context, node))
         shares.setdefault(name, []).extend(of_node)
         alone = tuple(share for share in of_node if not share.reentrant)
         if alone and name in declared and _threads(declared[name]) > 1:
@@ -254,14 +253,14 @@ def _threads(executor: Executor) -> int:
     return max(executor.threads, 1) if executor.kind is ExecutorKind.MULTI_THREADED else 1
 
 
-def _shares(known: Rates, node: Node) -> Iterator[CallbackLoad]:
+def _shares(context: Context, node: Node) -> Iterator[CallbackLoad]:
     callbacks: tuple[Timer | Port, ...] = (*node.timers, *node.ports)
     for callback in callbacks:
         budget_ms = callback.budget_ms
         if budget_ms is None:
             continue
         timer, port = (callback, None) if isinstance(callback, Timer) else (None, callback)
-        rate_hz = known.callback_hz(node, Cause(timer, port))
+        rate_hz = context.once(rates).callback_hz(node, Cause(timer, port))
         if rate_hz is not None:
             period = timer.period.value if timer is not None else None
             name = f"{node.name}.{callback.name}"

@@ -123,6 +123,8 @@ def check_separate_process(context: Context) -> Iterator[Diagnostic]:
 
 def check_isolation_between_processes(context: Context) -> Iterator[Diagnostic]:
     """Check the connections with 'isolation', with all ports of their topics."""
+    if all(connection.isolation is None for connection in context.system.connections):
+        return
     channel_of = {end.key: channel for channel in context.channels for end in channel.ends}
     for connection in context.system.connections:
         if connection.isolation is None:

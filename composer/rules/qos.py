@@ -176,12 +176,13 @@ FAST_HZ = 10.0
 
 def check_shallow_queue(context: Context) -> Iterator[Diagnostic]:
     """Check the publishers and subscriptions of topics with a known rate."""
-    known = context.once(rates)
     for node in context.system.nodes:
         for port in node.ports:
             if port.kind.channel is not ChannelKind.TOPIC or not port.qos.known:
                 continue
-            rate_hz = known.topic_hz(port.full_name) if _is_shallow(port.qos.profile) else None
+            if not _is_shallow(port.qos.profile):
+                continue
+            rate_hz = context.once(rates).topic_hz(port.full_name)
             if rate_hz is not None and rate_hz >= FAST_HZ:
                 yield Diagnostic(
                     UNSUITED_QOS,
@@ -225,14 +226,13 @@ _STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJoin
 
 def check_reliable_sensor_stream(context: Context) -> Iterator[Diagnostic]:
     """Check publishers of sensor messages with a known rate."""
-    known = context.once(rates)
     for channel in context.channels:
         if channel.kind is not ChannelKind.TOPIC:
             continue
         for source in channel.sources:
             if not (_is_stream(source.port.interface.value) and _is_reliable(source.port)):
                 continue
-            rate_hz = known.publisher_hz(source) or 0.0
+            rate_hz = context.once(rates).publisher_hz(source) or 0.0
             if rate_hz >= FAST_HZ:
                 sinks = tuple(
                     islice((e for e in channel.sinks if _is_reliable(e.port)), _SHOWN_SINKS)

@@ -183,7 +183,8 @@ def check_unused_remapping(context: Context) -> Iterator[Diagnostic]:
         # In a class or a program, the name of a port is what the connection renames.
         if not node.remappings and node.implementation not in _NAMES_IN_CODE:
             for port in node.ports:
-                yield from _overridden_name(node, port)
+                if port.ros_name is not port.name:
+                    yield from _overridden_name(node, port)
 
 
 def _overridden_name(node: Node, port: Port) -> Iterator[Diagnostic]:

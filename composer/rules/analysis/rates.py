@@ -172,15 +172,18 @@ def timed_publishers(context: Context) -> tuple[tuple[PortOfNode, float], ...]:
 
     The period is in seconds.
     """
+    known_causes = context.once(causes)
     found = []
     for node in context.system.nodes:
         for port in node.ports_of(PortKind.PUBLISHER):
-            of_port = context.once(causes).get(PortOfNode(node, port).key, ())
+            of_port = known_causes.get((node.name.value, port.name.value))
+            if not of_port:
+                continue
             periods = [
                 node.period_s(cause.timer) if cause.timer is not None else None for cause in of_port
             ]
             known = [period_s for period_s in periods if period_s is not None]
-            if known and len(known) == len(periods):
+            if len(known) == len(periods):
                 found.append((PortOfNode(node, port), min(known)))
     return tuple(found)
 
