@@ -1,9 +1,4 @@
-"""Runs pyrefly, a type checker from PyPI, in a process of its own under limits.
-
-What it has printed is kept by the content of the files: a project is checked far more often than
-its Python changes. The folder belongs to the user alone; whatever goes wrong with it, the checker
-runs instead.
-"""
+"""Runs pyrefly, a type checker from PyPI, in a process of its own under limits."""
 
 from __future__ import annotations
 
@@ -17,20 +12,11 @@ import sys
 import tempfile
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import field
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import read_regular
 from composer.python_code.problems import CheckerFailed
-from composer.python_code.stubs.folder import LIBRARIES
-
-try:
-    from _blake2 import blake2b  # hashlib also loads OpenSSL, which takes 3 ms of each start
-except ImportError:
-    from hashlib import blake2b
 
 #: The kinds that may be mistakes; the others are about annotations and definitions.
 _KINDS = (
@@ -51,9 +37,6 @@ _OFF_BY_DEFAULT = (
     "unreachable-except-clause",
 )
 TIME_LIMIT_S = 60.0
-#: Outputs that are kept, and the most bytes of one.
-_MAXIMUM_ENTRIES = 500
-_MAXIMUM_BYTES = 1_000_000
 #: The files that the checker writes.
 _OUTPUTS = ("output.json", "errors.txt")
 #: Seconds of processor time, and how many more for each megabyte. Usual code takes a tenth of it.
@@ -82,32 +65,26 @@ class Finding:
 
 @dataclass(slots=True)
 class Run:
-    """A run of the checker: a process in the background, or findings that are known already."""
+    """A run of the checker in the background."""
 
-    _entry: Path
-    _known: list[Finding] = field(default_factory=list)
-    _folder: tempfile.TemporaryDirectory[str] | None = None
-    _process: subprocess.Popen[bytes] | None = None
+    _folder: tempfile.TemporaryDirectory[str]
+    _process: subprocess.Popen[bytes]
 
     def findings(self) -> list[Finding]:
         """Wait for what the checker finds. Raises CheckerFailed."""
-        if self._process is None or self._folder is None:
-            return self._known
         try:
             self._process.wait(timeout=TIME_LIMIT_S)
+            output, errors = (Path(self._folder.name, name).read_bytes() for name in _OUTPUTS)
         except subprocess.TimeoutExpired:
             raise CheckerFailed(f"it took longer than {TIME_LIMIT_S:.0f} s") from None
+        except OSError as error:
+            raise CheckerFailed(f"its output is lost: {error.strerror}") from None
         finally:
-            output, errors = (_read(Path(self._folder.name, name)) for name in _OUTPUTS)
             self.close()
-        found = _findings(output, errors, self._process.returncode)
-        _keep_entry(self._entry, output)
-        return found
+        return _findings(output, errors, self._process.returncode)
 
     def close(self) -> None:
         """End the process and remove its files."""
-        if self._process is None or self._folder is None:
-            return
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait()
@@ -115,20 +92,12 @@ class Run:
 
 
 def start(files: Mapping[str, str], checked: Collection[str], search_paths: Iterable[str]) -> Run:
-    """Start to check files, unless they have been checked before.
+    """Start to check files.
 
     ``checked`` are the files to report about, ``search_paths`` the folders to import from. All
     are relative to a private folder that the files are written into. Raises CheckerFailed.
     """
-    options = [*_options(search_paths), "--", *checked]
-    installed = (*map(Path, package_folders()), *LIBRARIES.rglob("*.pyi"))
-    times = sorted(f"{path} {path.stat().st_mtime_ns}" for path in installed)
-    entry = _entry_of((*options, *times, *chain.from_iterable(files.items())))
-    kept = _read_entry(entry)
-    if kept is not None:
-        with suppress(CheckerFailed):
-            return Run(entry, _findings(kept, b"", 0))
-    command = [_program(), *options]
+    command = [_program(), *_options(search_paths), "--", *checked]
     try:
         folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
     except OSError as error:
@@ -140,7 +109,7 @@ def start(files: Mapping[str, str], checked: Collection[str], search_paths: Iter
         raise CheckerFailed(f"it cannot be started: {error.strerror}") from None
     size = sum(len(files[name]) for name in checked)
     _limit(process.pid, _CPU_S + _CPU_S_PER_MB * size // 1_000_000)
-    return Run(entry, _folder=folder, _process=process)
+    return Run(folder, process)
 
 
 def _popen(command: list[str], root: Path, files: Mapping[str, str]) -> subprocess.Popen[bytes]:
@@ -205,13 +174,6 @@ def _limit(process: int, cpu_s: int) -> None:
                 resource.prlimit(process, kind, (limit, limit))
 
 
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError:
-        return b""
-
-
 def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
     """Return what the checker has printed. Raises CheckerFailed."""
     if code == -signal.SIGXCPU:
@@ -229,47 +191,3 @@ def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
         return [Finding(*(item[name] for name in names)) for item in reported]
     except (KeyError, TypeError):
         raise CheckerFailed("its output has an unknown form") from None
-
-
-def _entry_of(state: Iterable[str]) -> Path:
-    """Return the file that keeps an output; ``state`` is all that the output depends on."""
-    home = os.environ.get("XDG_CACHE_HOME", "")
-    folder = Path(home) if Path(home).is_absolute() else _home() / ".cache"
-    digest = blake2b(digest_size=32)
-    for part in state:
-        digest.update(part.encode(errors="surrogatepass") + b"\0")
-    return folder / "ros2-composer" / "checks" / f"{digest.hexdigest()}.json"
-
-
-def _read_entry(entry: Path) -> bytes | None:
-    """Return the output that was kept, or None."""
-    with suppress(OSError, ValueError):
-        if entry.stat(follow_symlinks=False).st_uid == os.geteuid():
-            return read_regular(entry, _MAXIMUM_BYTES)
-    return None
-
-
-def _keep_entry(entry: Path, output: bytes) -> None:
-    """Keep an output, unless it is too large; the oldest entries make room."""
-    if len(output) > _MAXIMUM_BYTES:
-        return
-    with suppress(OSError):
-        entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        _remove_oldest(entry.parent)
-        written = entry.with_suffix(f".{os.getpid()}")
-        written.write_bytes(output)
-        written.replace(entry)
-
-
-def _home() -> Path:
-    try:
-        return Path.home()
-    except RuntimeError:  # in a container, users may be missing in /etc/passwd
-        return Path(tempfile.gettempdir())
-
-
-def _remove_oldest(folder: Path) -> None:
-    entries = [*folder.iterdir()]
-    if len(entries) >= _MAXIMUM_ENTRIES:
-        for path in sorted(entries, key=lambda path: path.stat().st_mtime)[: len(entries) // 2]:
-            path.unlink(missing_ok=True)
