@@ -22,7 +22,7 @@ from composer.python_code.modules import (
     module_origin,
     relative_module_file,
 )
-from composer.python_code.syntax import Class, Method, Module, read_module
+from composer.python_code.syntax import Class, Method, Module, defined_names, read_module
 from composer.python_code.trees import Import
 
 _Finder = Callable[[str, Path, Project], Path | None]
@@ -129,7 +129,9 @@ def find_behavior(
     return BehaviorSource(
         reference,
         module_found=True,
-        class_found=bool(classes) or module.may_have(reference.class_name),
+        class_found=bool(classes)
+        or module.dynamic
+        or reference.class_name in defined_names(module),
         complete=bool(classes) and all(item and not item[1].dynamic for item in classes),
         path=path,
         class_names=tuple(module.classes),

@@ -160,11 +160,6 @@ class NearbyModules:
     names: Sequence[str]
 
     @property
-    def path(self) -> str:
-        """The name up to the missing part."""
-        return f"{self.package}.{self.missing}".lstrip(".")
-
-    @property
     def similar(self) -> str | None:
         """The module that was most likely meant."""
         return nearest(self.missing, self.names)

@@ -23,16 +23,16 @@ from composer.python_code.trees import argument, span_of, walk
 
 #: A node, and the source of its behavior or class.
 NodeClass: TypeAlias = tuple[Node, BehaviorSource]
-#: The classes that behaviors may import from ``composer.behavior``.
-API_CLASSES = frozenset(
-    name
+#: The classes that behaviors may import from ``composer.behavior``, with their attributes.
+API_NAMES: Mapping[str, tuple[str, ...]] = {
+    name: tuple(attribute for attribute in dir(item) if not attribute.startswith("_"))
     for name, item in vars(behavior).items()
     if isinstance(item, type) and item.__module__ == behavior.__name__
-)
+}
 _PUBLISH = re.compile(r"self\.publishers\.(\w+)\.publish")
 _DECLARING = frozenset({"declare_parameter", "declare_parameters"})
 #: With one of these, parameters exist that the class does not declare by name.
-UNDECLARED = frozenset(
+_UNDECLARED = frozenset(
     {"allow_undeclared_parameters", "automatically_declare_parameters_from_overrides"}
     | {"get_parameters_by_prefix", "has_parameter"}
 )
@@ -182,7 +182,7 @@ def declared_parameters(source: BehaviorSource) -> DeclaredParameters:
     """Return the parameters that a class declares by methods of Node."""
     nodes = [node for module in source.own_modules for node in walk(module.tree.body)]
     texts = [module.source.text for module in source.own_modules]
-    is_open = any(name in text for name in UNDECLARED for text in texts)
+    is_open = any(name in text for name in _UNDECLARED for text in texts)
     # A method that is passed on, or called for another object, may declare anything.
     mentions = sum(isinstance(node, ast.Attribute) and node.attr in _DECLARING for node in nodes)
     parameters = DeclaredParameters({}, source.complete and source.class_found and not is_open)

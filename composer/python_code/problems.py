@@ -31,7 +31,6 @@ class Family(Enum):
     PARAMETER = "undeclared-parameter"
     CONSTRUCTOR = "missing-constructor"
     SELF = "missing-self"
-    INDEX = "index-out-of-range"
     SYNTAX = "python-syntax"
     NOT_CHECKED = "not-checked"
 

@@ -135,10 +135,6 @@ class Module:
         """The full names of what absolute imports bind."""
         return full_names(self.imports.items())
 
-    def may_have(self, name: str) -> bool:
-        """Return whether ``name`` may exist without a class statement in this file."""
-        return self.dynamic or name in defined_names(self)
-
 
 def read_module(path: Path, shown: str) -> Module:
     """Read a Python file; ``shown`` is its path in messages. Raises Unreadable."""

@@ -73,7 +73,6 @@ _RELIES_ON: Mapping[Family, tuple[str, ...]] = {
     Family.FIELD: ("type",),
     Family.VALUE: ("parameter", "type"),
     Family.MESSAGE_TYPE: ("type",),
-    Family.INDEX: ("parameter",),
     Family.IMPORT: ("folder",),
     Family.NOT_INSTALLED: ("folder",),
 }

@@ -14,8 +14,9 @@ mistakes of every eighth file, ``make soak`` all of all files, and those in ``mo
 
 The files in ``code`` are about Python alone, a third of it in rclpy classes, and by other authors.
 Left out are kinds that are not checked any more: attributes and arguments that change their kind,
-attributes that are never read, formats, elements that an array parameter lacks, unpacking, and
-results that are not used.
+attributes that are never read, formats, elements that an array parameter lacks, unpacking, results
+that are not used, indices of fixed arrays and lengths of other fields, ints in arrays of floats,
+statuses compared with other texts, and undeclared parameters without a similar name.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ MEASURED = {
 MEASURED_CODE = {
     "robots": (0.95, 1.04, 0.98),
     "vehicles": (0.91, 1.04, 0.98),
-    "machines": (0.90, 1.08, 0.86),
+    "machines": (0.90, 1.08, 0.85),
 }
 MIN_MISTAKES, MIN_VALID = 220, 50
 

@@ -1,15 +1,17 @@
-"""The callbacks of rclpy classes: which methods rclpy calls, and with what arguments."""
+"""The callbacks of a class: which methods the composer and rclpy call, with what arguments."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Mapping
-from types import MappingProxyType
 
+from composer.interfaces import Interfaces
+from composer.model import Node, PortKind
 from composer.python_code.lookup import imported_from
 from composer.python_code.nodes import Signature
+from composer.python_code.stubs.behaviors import port_type, signatures
 from composer.python_code.syntax import Module
-from composer.python_code.trees import Function, argument, called_name, dotted, is_none, last_name
+from composer.python_code.trees import Function, argument, bindings, called_name, dotted
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
 _SENT_GOAL = "rclpy.action.client.ClientGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
@@ -22,7 +24,7 @@ _OF_ACTION_SERVERS = {
 }
 _OF_SUBSCRIPTIONS = Signature((("message", "{0}"),), "")
 _OF_SERVICES = Signature((("request", "{0}.Request"), ("response", "{0}.Response")), "{0}.Response")
-_TRANSITIONS = ("activate", "cleanup", "configure", "deactivate", "error", "shutdown")
+TRANSITIONS = ("activate", "cleanup", "configure", "deactivate", "error", "shutdown")
 _TRANSITION = Signature(
     (("state", "rclpy.lifecycle.LifecycleState"),), "rclpy.lifecycle.TransitionCallbackReturn"
 )
@@ -31,6 +33,7 @@ _FEEDBACK = Signature((("feedback", "{0}.Feedback"),), "")
 _FEEDBACK_MESSAGE = Signature(
     (("feedback_message", "rclpy.action.client._FeedbackMessage[{0}.Feedback]"),), ""
 )
+#: The methods that return futures.
 _FUTURES = {
     "call_async": "rclpy.task.Future[{0}.Response]",
     "send_goal_async": f"rclpy.task.Future[{_SENT_GOAL}]",
@@ -39,38 +42,41 @@ _FUTURES = {
 
 
 def callback_signatures(
-    node: ast.ClassDef, module: Module, ports: Mapping[str, str] = MappingProxyType({})
+    class_: ast.ClassDef, module: Module, node: Node | None, interfaces: Interfaces
 ) -> dict[str, Signature]:
-    """Return the methods of a class that rclpy calls, with what they are called with.
+    """Return the methods of a class that the composer or rclpy calls, with their arguments.
 
-    ``ports`` are the types of what a behavior sends goals with: ``self.action_clients.navigate``.
-    A method that is passed as a callback of several types is left out. A callback of a client or
-    future has a known type if the class has clients of one service, or of one action, only.
+    ``node`` is the node of the class, if it has one. A method that is passed as a callback of
+    several types is left out. A callback of a client or future has a known type if the class has
+    clients of one service, or of one action, only.
     """
     found: dict[str, set[Signature]] = {}
-    calls = [item for item in ast.walk(node) if isinstance(item, ast.Call)]
-    service = _only(
-        _type(argument(x, 0, "srv_type"), module) for x in _named("create_client", calls)
-    )
-    action = _only(
-        _type(argument(x, 1, "action_type"), module) for x in _named("ActionClient", calls)
-    )
-    goals = {"send_goal_async": action, "get_result_async": action}
-    clients = {**ports, **goals, "call_async": service}
-    attributes = {name: made for name, made in _futures(node).items() if "." in name}
-    for function in (item for item in node.body if isinstance(item, Function)):
-        futures = {**_futures(function), **attributes}
+    named = [(called_name(item), item) for item in ast.walk(class_) if isinstance(item, ast.Call)]
+    actions = (argument(call, 1, "action_type") for name, call in named if name == "ActionClient")
+    services = (argument(call, 0, "srv_type") for name, call in named if name == "create_client")
+    action, service = (_only(_type(x, module) for x in types) for types in (actions, services))
+    clients = {"send_goal_async": action, "get_result_async": action, "call_async": service}
+    for port in node.ports_of(PortKind.ACTION_CLIENT) if node is not None else ():
+        clients[f"self.action_clients.{port.name}"] = port_type(port, interfaces) or ""
+    for function in (item for item in class_.body if isinstance(item, Function)):
+        values = {**bindings(class_), **bindings(function)}
         for call in (item for item in ast.walk(function) if isinstance(item, ast.Call)):
-            for name, signature in _of_call(call, module, clients, futures):
+            for name, signature in _of_call(call, values, module, clients):
                 found.setdefault(name, set()).add(signature)
-    origins = [imported_from(module, dotted(base)) for base in node.bases]
+    origins = [imported_from(module, dotted(base)) for base in class_.bases]
     if any(origin is not None and origin.name == "LifecycleNode" for origin in origins):
-        found |= {f"on_{name}": {_TRANSITION} for name in _TRANSITIONS}
-    return {name: items.pop() for name, items in found.items() if len(items) == 1}
+        found |= {f"on_{name}": {_TRANSITION} for name in TRANSITIONS}
+    known = {name: items.pop() for name, items in found.items() if len(items) == 1}
+    if node is not None and node.behavior is not None:
+        known |= signatures(node, interfaces)
+    return known
 
 
 def _of_call(
-    call: ast.Call, module: Module, clients: Mapping[str, str], futures: Mapping[str, str]
+    call: ast.Call,
+    values: Mapping[str, list[ast.expr | None]],
+    module: Module,
+    clients: Mapping[str, str],
 ) -> Iterator[tuple[str, Signature]]:
     match called_name(call):
         case "create_subscription":
@@ -95,10 +101,8 @@ def _of_call(
             callback = argument(call, 1, "feedback_callback")
             yield from _bound(callback, clients["send_goal_async"], _FEEDBACK_MESSAGE)
         case "add_done_callback" if isinstance(call.func, ast.Attribute):
-            receiver = call.func.value
-            made = futures.get(dotted(receiver), "")
-            if isinstance(receiver, ast.Call):
-                made = last_name(receiver.func)
+            futures = (call.func.value, *values.get(dotted(call.func.value), ()))
+            made = _only(called_name(item) for item in futures if isinstance(item, ast.Call))
             future = Signature((("future", _FUTURES.get(made, "")),), "")
             yield from _bound(argument(call, 0, "callback"), clients.get(made, ""), future)
 
@@ -106,32 +110,10 @@ def _of_call(
 def _bound(
     callback: ast.expr | None, type_: str, signature: Signature
 ) -> Iterator[tuple[str, Signature]]:
-    """Yield the method that is passed as ``self.method``, with its signature.
-
-    Arguments that ``partial(self.method, ...)`` adds have no known type, "".
-    """
-    before: tuple[tuple[str, str], ...] = ()
-    if isinstance(callback, ast.Call) and last_name(callback.func) == "partial" and callback.args:
-        before = (("", ""),) * (len(callback.args) - 1)
-        callback = callback.args[0]
+    """Yield the method that is passed as ``self.method``, with its signature."""
     name = dotted(callback) if callback is not None else ""
     if type_ and name.startswith("self.") and name.count(".") == 1:
-        typed = signature.of(type_)
-        yield name.removeprefix("self."), Signature((*before, *typed.arguments), typed.result)
-
-
-def _futures(node: ast.ClassDef | Function) -> dict[str, str]:
-    """Return the names that always have futures of one kind, with the method that returns them."""
-    found: dict[str, set[str]] = {}
-    for item in ast.walk(node):
-        match item:
-            case ast.Assign(targets=[target], value=value) if not is_none(value):
-                found.setdefault(dotted(target), set()).add(called_name(value))
-    return {name: _only(made) for name, made in found.items()}
-
-
-def _named(name: str, calls: list[ast.Call]) -> Iterator[ast.Call]:
-    yield from (call for call in calls if called_name(call) == name)
+        yield name.removeprefix("self."), signature.of(type_)
 
 
 def _only(types: Iterable[str]) -> str:

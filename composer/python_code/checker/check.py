@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
@@ -17,9 +16,6 @@ from composer.python_code.checker.file_sets import FileSet, file_sets
 from composer.python_code.checker.pyrefly import MISSING_RETURN, SYNTAX_KINDS, Finding, Run, start
 from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.problems import CheckerFailed, Family, Problem
-
-if TYPE_CHECKING:
-    from composer.python_code.checker.relevance import Relevance
 
 #: Findings in one file that are read, as each costs time. A real file has a few.
 MAX_FINDINGS = 500
@@ -66,15 +62,17 @@ class Check:
     def _problems(
         self, places: Mapping[str, list[tuple[Finding, Span]]]
     ) -> Iterator[tuple[str, Problem]]:
+        """Yield the problems of each file: one of a family in a line, and one of each message."""
         # Most code has no findings, and these modules take 10 ms of each start.
         from composer.python_code.checker.code_index import CodeIndex  # noqa: PLC0415 - slow
+        from composer.python_code.checker.findings import Reader  # noqa: PLC0415 - slow
         from composer.python_code.checker.owners import Owners  # noqa: PLC0415 - slow
         from composer.python_code.checker.relevance import (  # noqa: PLC0415 - slow
             Relevance,
             changed_names,
         )
 
-        owners = Owners(self.files.behaviors, self._stubs)
+        owners = Owners(self._stubs)
         codes = {path: CodeIndex(self._copies[path].module) for path in places}
         attributes = frozenset(name for code in codes.values() for name in code.attributes_set())
         classes = frozenset(name for module in self.files.modules for name in module.classes)
@@ -82,35 +80,25 @@ class Check:
             file = self.files.files[path]
             changed = changed_names(finding for finding, _ in in_file)
             relevance = Relevance(codes[path], file, owners, changed, attributes, classes)
-            for problem in self._problems_in(in_file[:MAX_FINDINGS], relevance):
-                yield path, problem
+            seen: set[object] = set()
+            wrong_imports: list[str] = []
+            for finding, span in in_file[:MAX_FINDINGS]:
+                problem = Reader(finding, span, relevance, self._interfaces).problem()
+                if problem is None:
+                    continue
+                keys: set[object] = {(problem.span.line, problem.family)}
+                if finding.kind != "missing-import":  # all places of one are shown together
+                    keys.add(problem.message)
+                text = problem.span.text
+                if problem.family is Family.IMPORT:
+                    wrong_imports.append(text)
+                is_meant = text[:1].isupper() or nearest(text, wrong_imports)
+                is_follow_up = problem.family is Family.NAME and wrong_imports and is_meant
+                if seen.isdisjoint(keys) and not is_follow_up:
+                    yield path, problem
+                seen |= keys
             for _, span in in_file[MAX_FINDINGS : MAX_FINDINGS + 1]:
                 yield path, Problem(Family.NOT_CHECKED, _TOO_MANY, span)
-
-    def _problems_in(
-        self, findings: Iterable[tuple[Finding, Span]], relevance: Relevance
-    ) -> Iterator[Problem]:
-        """Yield the problems of a file: one of each family in a line, and one of each message."""
-        from composer.python_code.checker.findings import Reader  # noqa: PLC0415 - slow
-
-        seen: set[object] = set()
-        wrong_imports: list[str] = []
-        for finding, span in findings:
-            if not relevance.keeps(finding, span):
-                continue
-            problem = Reader(finding, span, relevance, self._interfaces).problem()
-            if problem is None:
-                continue
-            keys: set[object] = {(problem.span.line, problem.family)}
-            if finding.kind != "missing-import":  # all places of one are shown together
-                keys.add(problem.message)
-            text = problem.span.text
-            if problem.family is Family.IMPORT:
-                wrong_imports.append(text)
-            is_follow_up = problem.family is Family.NAME and _is_meant(text, wrong_imports)
-            if seen.isdisjoint(keys) and not is_follow_up:
-                yield problem
-            seen |= keys
 
     def _syntax_problems(self, refused: set[str]) -> Iterator[tuple[str, Problem]]:
         """Yield the files that Python cannot parse, those that the checker can parse as info."""
@@ -121,8 +109,8 @@ class Check:
             if name not in refused:
                 version = ".".join(map(str, sys.version_info[:2]))
                 message = f"this Python, {version}, cannot parse the file, which needs a newer one"
-                hint = "Jazzy's Python is 3.12"
-                problem = Problem(Family.NOT_CHECKED, message, problem.span, hint)
+                place = problem.span
+                problem = Problem(Family.NOT_CHECKED, message, place, "Jazzy's Python is 3.12")
             yield name, problem
 
     def _places(self, findings: Iterable[Finding]) -> dict[str, list[tuple[Finding, Span]]]:
@@ -200,12 +188,6 @@ def start_checks(
     check = RunningCheck(interfaces, file_sets(classes)[:_MAXIMUM])
     check.fill()
     return check
-
-
-def _is_meant(name: str, wrong: Collection[str]) -> bool:
-    """Return whether one of the names that cannot be imported should be ``name``."""
-    is_class = name[:1].isupper() and any(other[:1].isupper() for other in wrong)
-    return is_class or nearest(name, wrong) is not None
 
 
 def _span(finding: Finding, copy: Copy) -> Span:

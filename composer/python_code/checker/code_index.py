@@ -20,6 +20,8 @@ from composer.python_code.trees import (
 
 #: Statements whose code may be left out, or may fail.
 _CONDITIONAL = (ast.If, ast.Match, ast.Try, ast.With)
+#: Code that uses a value without looking at it.
+_USES = (ast.Attribute, ast.BinOp, ast.Call, ast.FormattedValue, ast.Subscript, ast.keyword)
 #: What code raises that uses a value of a wrong type.
 _ERRORS = frozenset({"AttributeError", "NameError", "TypeError"})
 
@@ -102,42 +104,23 @@ class CodeIndex:
         """
         alternatives = self.module.alternatives.keys()
         for name in filter(None, map(dotted, self._expressions.get(line, ()))):
-            key = name, self._scope(name, line)
+            place = self.class_at(line) if "." in name else self.function_at(line)
+            key = name, place or self.module.tree
             if key not in self._made:
-                classes = {*map(_made_class, self.values_of(name, line))}
-                self._made[key] = frozenset(classes - {""})
+                values = filter(None, bindings(key[1]).get(name, ()))
+                self._made[key] = frozenset(map(_made_class, values)) - {""}
             made = self._made[key]
             if len(made) > 1 or made & alternatives or name.partition(".")[0] in alternatives:
                 return True
         return False
 
     def is_guarded(self, line: int) -> bool:
-        """Return whether a line is where code asks for attributes, or catches what a lack raises.
+        """Return whether the code around a line catches what the lack of an attribute raises.
 
         Which attributes an object has may depend on the version of a package.
         """
-        return line in self._guarded
-
-    @cached_property
-    def _guarded(self) -> frozenset[int]:
-        guarded: list[ast.stmt | None] = []
-        for node in self._nodes:
-            if isinstance(node, ast.Try) and any(catches(x, _ERRORS) for x in node.handlers):
-                guarded += node.body
-            elif isinstance(node, ast.Call) and called_name(node) == "hasattr":
-                guarded.append(self.function_at(node.lineno))
-        places = filter(None, guarded)
-        lines = (range(x.lineno, (x.end_lineno or x.lineno) + 1) for x in places)
-        return frozenset(line for each in lines for line in each)
-
-    def values_of(self, name: str, line: int) -> list[ast.expr]:
-        """Return the values of a local name or own attribute that a line may see."""
-        values = bindings(self._scope(name, line)).get(name, ())
-        return [value for value in values if value is not None]
-
-    def _scope(self, name: str, line: int) -> ast.AST:
-        scope = self.class_at(line) if "." in name else self.function_at(line)
-        return scope or self.module.tree
+        attempts = (node for node in self.around(line) if isinstance(node, ast.Try))
+        return any(catches(handler, _ERRORS) for node in attempts for handler in node.handlers)
 
     def is_checked(self, scope: ast.AST, name: str) -> bool:
         """Return whether a class or function compares a value, tests it or stores it elsewhere."""
@@ -173,14 +156,8 @@ def _made_class(value: ast.expr) -> str:
 
 
 def _checks_in(scope: ast.AST) -> Iterator[ast.AST]:
-    """Yield the expressions that code compares, tests, stores or returns."""
+    """Yield the expressions that code compares, tests, stores or returns: not only uses."""
     for node in ast.walk(scope):
-        match node:
-            case ast.Compare() | ast.BoolOp() | ast.UnaryOp():
-                yield from ast.iter_child_nodes(node)
-            case ast.If(test=value) | ast.IfExp(test=value) | ast.While(test=value):
-                yield value
-            case ast.Assert(test=value) | ast.Match(subject=value) | ast.comprehension(iter=value):
-                yield value
-            case ast.Assign(value=value) | ast.AnnAssign(value=value) | ast.Return(value=value):
-                yield from (value, *getattr(value, "elts", ())) if value is not None else ()
+        if not isinstance(node, _USES):
+            parts = (x for x in ast.iter_child_nodes(node) if isinstance(x, ast.expr))
+            yield from (x for x in parts if not isinstance(getattr(x, "ctx", None), ast.Store))

@@ -16,10 +16,9 @@ from typing import TypeGuard
 
 from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
-from composer.model import Node, PortKind
+from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.nodes import Signature
-from composer.python_code.stubs.behaviors import port_type, signatures
 from composer.python_code.stubs.messages import interface_modules
 from composer.python_code.syntax import Method, Module
 from composer.python_code.trees import (
@@ -72,13 +71,7 @@ def edited_copy(
         node, base = nodes.get((module.path, class_.name), (None, ""))
         if base and base not in {name.rpartition(".")[2] for name in class_.bases}:
             edits.add_base(class_.node, f"composer.typed.{base}")
-        ports = {
-            f"self.action_clients.{port.name}": port_type(port, interfaces) or ""
-            for port in (node.ports_of(PortKind.ACTION_CLIENT) if node is not None else ())
-        }
-        known = callback_signatures(class_.node, module, ports)
-        if node is not None and node.behavior is not None:
-            known |= signatures(node, interfaces)
+        known = callback_signatures(class_.node, module, node, interfaces)
         for method in class_.methods:
             signature = known.get(method.name)
             if signature is not None and method.node is not None:
@@ -146,7 +139,7 @@ class _Edits:
         known = [
             f"{item.arg} = typing.cast({type_!r}, {item.arg})"
             for item, (_, type_) in pairs
-            if type_ and (item.annotation is None or _is_generic(item.annotation, type_))
+            if type_ and (item.annotation is None or "[" in type_)  # as ServerGoalHandle lacks it
         ]
         if known:
             self.added.append((number - 1, indentation + "; ".join(known)))
@@ -183,9 +176,3 @@ def _is_unset(
             others = filter(None, values.get(dotted(target), ()))
             return statement.end_lineno == statement.lineno and not all(map(is_none, others))
     return False
-
-
-def _is_generic(annotation: ast.expr, type_: str) -> bool:
-    """Return whether an annotation such as ``ServerGoalHandle`` lacks the types in brackets."""
-    name, bracket, _ = type_.partition("[")
-    return bool(bracket) and dotted(annotation).rpartition(".")[2] == name.rpartition(".")[2]

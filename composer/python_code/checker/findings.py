@@ -9,15 +9,13 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Iterable
 
+from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.base.spelling import vocabulary
 from composer.interfaces import Interfaces
-from composer.python_code.checker.code_index import CodeIndex
 from composer.python_code.checker.imports import Imports
-from composer.python_code.checker.owners import Owner, public_names
+from composer.python_code.checker.owners import Owner
 from composer.python_code.checker.pyrefly import MISSING_RETURN, Finding
 from composer.python_code.checker.relevance import (
     ARGUMENT,
@@ -26,15 +24,13 @@ from composer.python_code.checker.relevance import (
     is_parameter,
     unguarded_value,
 )
-from composer.python_code.nodes import API_CLASSES
+from composer.python_code.nodes import API_NAMES
 from composer.python_code.problems import Family, Problem
 from composer.python_code.trees import (
     Function,
-    dotted,
     is_none,
     name_span,
     positional_arguments,
-    span_of,
 )
 
 _FAMILIES = {
@@ -57,19 +53,13 @@ _ASSIGNMENT = (
     r"`(?P<given>.+?)` is not assignable to (?:attribute `\w+` with type |declared return type )?"
     r"`(?P<expected>.+?)`"
 )
-_CALLBACKS = frozenset({"callback", "execute_callback", "feedback_callback", "on_feedback"})
 _MEANT = r"Did you mean `(\w+)`\?"
 #: A function of a message class: its constructor, or the setter of a field.
 _OF_MESSAGE = r"(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)"
 _LITERAL = r"Literal\[(.+?)\]"
 _MODULE = r"\b(?:composer\.(?:typed|behavior)|_ros|builtins)\."
-#: The methods that send a message, with the beginning of the sentence about its type.
-_SENDING = {
-    "composer.behavior.Publisher.publish": "the port publishes",
-    "composer.behavior.Client.call": "the port requests",
-    "composer.behavior.ActionClient.send_goal": "the port sends",
-    "composer.behavior.Goal.publish_feedback": "the feedback is",
-}
+#: The methods of a behavior that send a message.
+_SENDING = r"composer\.behavior\.\w+\.(?:publish|call|send_goal|publish_feedback)"
 #: Modules besides the standard library of which every name is known.
 _COMPLETE_MODULES = frozenset({"composer", "numpy", "rclpy"})
 
@@ -83,13 +73,10 @@ class Reader:
     known: Relevance
     interfaces: Interfaces
 
-    @property
-    def code(self) -> CodeIndex:
-        """The syntax of the file."""
-        return self.known.code
-
     def problem(self) -> Problem | None:
         """Return what the finding means, None if it does not matter."""
+        if not self.known.keeps(self.finding, self.span):
+            return None
         if is_parameter(self.finding.kind, self.finding.message):
             return self._made(Family.TYPE, "this is a Parameter, not its value", "add .value")
         if self.finding.kind in _READERS:
@@ -108,23 +95,17 @@ class Reader:
         return self._made(family, text[:1].lower() + text[1:], hint)
 
     def _import(self) -> Problem | None:
-        node = self.code.import_at(self.span.line)
+        node = self.known.code.import_at(self.span.line)
         if node is None:
             return None
-        imports = Imports(self.code.module, self.known.file.source, self.interfaces)
+        module, source = self.known.code.module, self.known.file.source
+        imports = Imports(self.span, module, source, self.interfaces)
         found = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
         wanted = found["imported"] if found is not None else node.names[0].name
         if isinstance(node, ast.Import):
-            failed = imports.missing_module(self.span.text.split()[0], "")
-        else:
-            module = "." * node.level + (node.module or "")
-            missing = imports.missing_module if found is None else imports.missing_name
-            failed = missing(module, wanted)
-        if failed is None:
-            return None
-        place = re.search(rf"\b{re.escape(failed.part)}\b", self.span.text)
-        self.span = self.span.part(place.start() if place else 0, len(failed.part))
-        return Problem(failed.family, failed.message, self.span, failed.hint)
+            return imports.missing_module(self.span.text.split()[0], "")
+        missing = imports.missing_module if found is None else imports.missing_name
+        return missing("." * node.level + (node.module or ""), wanted)
 
     def _attribute(self) -> Problem | None:
         in_module = re.search(_NO_MODULE_ATTRIBUTE, self.finding.message)
@@ -137,36 +118,29 @@ class Reader:
         if {item["owner"] for item in found} == {"NoneType"}:
             return self._none()
         if named == "Coroutine":
-            return self._unawaited_value()
-        node = self.code.expression_at(self.span)
-        module = self.code.module
+            value = self.span.text.rpartition(f".{name}")[0]
+            message = f"'{value}' is a coroutine, not its result"
+            return self._made(Family.AWAIT, message, "write 'await' before the call")
+        node = self.known.code.expression_at(self.span)
+        module = self.known.code.module
         is_own = named in module.classes
         with_api = not self.known.is_class
         owner = None if is_own else self.known.owners.named(named, module, with_api=with_api)
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
+        meant = _meant(self.finding.message)
         if owner is not None:
-            return self._in_its_words(owner.family, owner.hint(name))
+            return self._in_its_words(owner.family, owner.hint(name) or meant)
         is_stored = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
         if is_stored and not is_own:
             return None  # most objects take any attribute
-        names = public_names("Behavior") if is_own and with_api else ()
-        return self._in_its_words(hint=_meant(self.finding.message) or _did_you_mean(name, names))
-
-    def _unawaited_value(self) -> Problem:
-        """Return the problem of a name that was assigned without 'await', where it was."""
-        name = self.span.text.partition(".")[0]
-        values = self.code.values_of(name, self.span.line)
-        calls = [x for x in values if isinstance(x, ast.Call) and x.lineno <= self.span.line]
-        if calls:
-            self.span = span_of(max(calls, key=lambda call: call.lineno).func, self.span.file)
-        return self._await()
+        names = API_NAMES["Behavior"] if is_own and with_api else ()
+        return self._in_its_words(hint=meant or suggestion(name, names, limit=0))
 
     def _module_attribute(self, found: re.Match[str]) -> Problem | None:
         name, module = found["name"] or found["imported"], found["module"]
         top = module.partition(".")[0]
-        is_standard = top in sys.stdlib_module_names
-        is_known = is_standard or top in _COMPLETE_MODULES
+        is_known = top in sys.stdlib_module_names or top in _COMPLETE_MODULES
         if found["imported"] and not is_known:
             return self._import()
         own = {item.path.stem for item in self.known.file.source.own_modules}
@@ -175,10 +149,8 @@ class Reader:
         at = self.span.text.rfind(name)
         self.span = self.span.part(max(at, 0), len(name))
         family = Family.IMPORT if found["imported"] else Family.ATTRIBUTE
-        is_loaded = module in sys.modules and (is_standard or top == "composer")
-        names = dir(sys.modules[module]) if is_loaded else ()
-        hint = _did_you_mean(name, names) or _meant(self.finding.message)
-        return self._in_its_words(family, hint)
+        names = dir(sys.modules[module]) if is_known and module in sys.modules else ()
+        return self._in_its_words(family, suggestion(name, names, limit=0))
 
     def _argument(self) -> Problem | None:
         found = ARGUMENT.search(self.finding.message)
@@ -187,14 +159,9 @@ class Reader:
         given, expected, function = found["given"], found["expected"], found["function"]
         if _may_be_none(given, expected):
             return self._none()
-        node = self.code.expression_at(self.span)
-        if isinstance(node, ast.Call) and found["name"] in _CALLBACKS:
-            name = dotted(node.func)
-            return self._in_its_words(Family.SIGNATURE, f"write '{name}' without '()'")
         hint = _part_hint(expected, given)
-        if function in _SENDING:
-            message = f"{_SENDING[function]} {_plain(expected)}, not {_plain(given)}"
-            return self._made(Family.MESSAGE_TYPE, message, hint)
+        if found["name"] != "on_feedback" and re.fullmatch(_SENDING, function):
+            return self._in_its_words(Family.MESSAGE_TYPE, hint)
         if expected.startswith("Float") and _plain(given).lstrip("-").isdigit():
             hint = f"write {_plain(given)}.0"
         is_field = re.fullmatch(_OF_MESSAGE, function) is not None
@@ -205,7 +172,7 @@ class Reader:
             rf"Unexpected keyword argument `(\w+)` in function `{_OF_MESSAGE}`",
             self.finding.message,
         )
-        homes = self.known.owners.messages.get(called[4], {}) if called is not None else {}
+        homes = self.known.owners.members.get(called[4], {}) if called is not None else {}
         members = homes.get(f"{called[2]}.{called[3]}") if called is not None else None
         if called is None or members is None:
             return self._in_its_words()
@@ -213,22 +180,21 @@ class Reader:
 
     def _name(self) -> Problem | None:
         name = self.span.text
-        if name == "self" and self.code.class_at(self.span.line) is not None:
+        if name == "self" and self.known.code.class_at(self.span.line) is not None:
             return self._missing_self()
         if name in sys.stdlib_module_names:
             hint = f"add 'import {name}'"
-        elif name in API_CLASSES:
+        elif name in API_NAMES:
             hint = f"add 'from composer.behavior import {name}'"
         else:
-            module = self.code.module
-            names = {*self.code.names, *module.imports, *module.classes}
-            hint = _did_you_mean(name, sorted(names)) or "import it, or define it"
+            hint = _meant(self.finding.message) or "import it, or define it"
         return self._in_its_words(hint=hint)
 
     def _missing_self(self) -> Problem | None:
         """Return the problem of a method without arguments, or without the 'self' that it uses."""
-        class_, function = self.code.class_at(self.span.line), self.code.function_at(self.span.line)
-        if class_ is None or function is None or function.name in self.code.names:
+        code, line = self.known.code, self.span.line
+        class_, function = code.class_at(line), code.function_at(line)
+        if class_ is None or function is None or function.name in code.names:
             return None  # a plain function, which the body of the class uses
         names = ("self", *(item.arg for item in positional_arguments(function)))
         self.span = name_span(function, "def", self.span.file)
@@ -242,7 +208,7 @@ class Reader:
 
     def _return(self) -> Problem | None:
         found = re.search(_ASSIGNMENT, self.finding.message)
-        function = self.code.function_at(self.span.line)
+        function = self.known.code.function_at(self.span.line)
         if self.finding.message.endswith(MISSING_RETURN) and function is not None:
             return self._missing_return(function)
         if found is None or "Falsy" in found["given"]:
@@ -263,7 +229,7 @@ class Reader:
         """Return the problem of a value that may be None, unless the class checks it elsewhere."""
         if self.known.is_class:
             return None  # in what order rclpy calls a class is not known
-        name = unguarded_value(self.code, self.span, self.finding.message)
+        name = unguarded_value(self.known.code, self.span, self.finding.message)
         if name is None:
             return None
         message = f"'{name}' may be None here"
@@ -274,7 +240,6 @@ class Reader:
 
 
 _READERS = {
-    "bad-argument-count": Reader._keyword,
     "bad-argument-type": Reader._argument,
     "bad-function-definition": Reader._missing_self,
     "bad-return": Reader._return,
@@ -291,11 +256,6 @@ def _meant(message: str) -> str | None:
     """Return the hint of the checker."""
     found = re.search(_MEANT, message)
     return f"did you mean '{found[1]}'?" if found is not None else None
-
-
-def _did_you_mean(name: str, names: Iterable[str]) -> str | None:
-    close = (other for other in vocabulary(tuple(names)).close(name, 2) if other != name)
-    return next((f"did you mean '{other}'?" for other in close), None)
 
 
 def _plain(text: str) -> str:

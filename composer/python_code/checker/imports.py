@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
@@ -9,13 +10,14 @@ from pathlib import Path
 
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.base.spelling import edit_distance
 from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.project import Project
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.modules import module_below, module_origin, nearby_modules
-from composer.python_code.problems import Family
+from composer.python_code.problems import Family, Problem
 from composer.python_code.stubs.folder import LIBRARIES
 from composer.python_code.syntax import Module, defined_names
 
@@ -31,24 +33,18 @@ _LONG_NAME = 8  # letters, of which two may be wrong
 
 
 @dataclass(frozen=True, slots=True)
-class FailedImport:
-    """What cannot be imported: the wrong part of the name, and what is wrong with it."""
-
-    part: str
-    message: str
-    hint: str | None = None
-    family: Family = Family.IMPORT
-
-
-@dataclass(frozen=True, slots=True)
 class Imports:
-    """The imports of one file of a behavior or class. Relative names begin with their dots."""
+    """The imports of one file of a behavior or class. Relative names begin with their dots.
 
+    ``span`` is where the type checker reports an import that fails.
+    """
+
+    span: Span
     module: Module
     source: BehaviorSource
     interfaces: Interfaces
 
-    def missing_module(self, name: str, wanted: str) -> FailedImport | None:
+    def missing_module(self, name: str, wanted: str) -> Problem | None:
         """Return why a module cannot be imported; None if it exists, but not as Python source.
 
         ``wanted`` is the name to import from it, or "".
@@ -73,10 +69,11 @@ class Imports:
             names.update(FOLDERS)
         elif not nearby.package and is_absolute:
             names.update(_USUAL, packages)
-        message = f"no module named '{name.removesuffix(relative)}{nearby.path}'"
+        path = f"{nearby.package}.{nearby.missing}".lstrip(".")
+        message = f"no module named '{name.removesuffix(relative)}{path}'"
         return self._misspelled(nearby.missing, message, names, " is installed")
 
-    def missing_name(self, module: str, name: str) -> FailedImport | None:
+    def missing_name(self, module: str, name: str) -> Problem | None:
         """Return why a name cannot be imported from a module; None if that is not known."""
         message = f"module '{module}' has no '{name}'"
         package, _, folder = module.partition(".")
@@ -119,7 +116,7 @@ class Imports:
 
     def _misspelled(
         self, name: str, message: str, names: Iterable[str], where: str = ""
-    ) -> FailedImport | None:
+    ) -> Problem | None:
         """Return the problem of a name: an error if another one was meant, else an info.
 
         ``where`` ends the message of an info.
@@ -132,14 +129,17 @@ class Imports:
         if distance <= limit:
             return self._failed(name, message, f"did you mean '{close}'?")
         hint = "install it, or correct the name"
-        return FailedImport(name, f"{message}{where}", hint, Family.NOT_INSTALLED)
+        return self._failed(name, f"{message}{where}", hint, Family.NOT_INSTALLED)
 
-    def _failed(self, part: str, message: str, hint: str | None = None) -> FailedImport:
-        """Return an error, unless the file searches for modules itself."""
+    def _failed(
+        self, part: str, message: str, hint: str | None = None, family: Family = Family.IMPORT
+    ) -> Problem:
+        """Return the problem of a part of the name; an info if the file searches for modules."""
         if any(text in self.module.source.text for text in _AT_RUN_TIME):
-            hint = "the file searches for modules itself"
-            return FailedImport(part, message, hint, Family.NOT_INSTALLED)
-        return FailedImport(part, message, hint)
+            hint, family = "the file searches for modules itself", Family.NOT_INSTALLED
+        place = re.search(rf"\b{re.escape(part)}\b", self.span.text)
+        span = self.span.part(place.start() if place else 0, len(part))
+        return Problem(family, message, span, hint)
 
 
 def _is_installed(name: str) -> bool:

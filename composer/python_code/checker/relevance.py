@@ -108,12 +108,12 @@ class Relevance:
         if given is not None and self._is_loose(given, node, is_ros=is_ros):
             return False
         named = [given["given"]] if given is not None else re.findall(r"`(\w+)`", message)
-        is_message = any(
-            name in self.owners.messages and name not in self.classes for name in named
-        )
+        is_message = any(name in self.owners.members and name not in self.classes for name in named)
         return not self.is_class or kind in _CERTAIN_KINDS or is_ros or is_message
 
     def _keeps_attribute(self, message: str, node: ast.expr | None) -> bool:
+        if "hasattr" in self.code.names:
+            return False  # the attribute may depend on the version of a package
         owner = NO_ATTRIBUTE.search(message)
         name = owner["owner"] if owner is not None else ""
         value = node.value if isinstance(node, ast.Attribute) else None

@@ -1,20 +1,17 @@
-"""Constants and lists that do not fit the fields of messages, and wrong indices."""
+"""Constants and lists that do not fit the fields of messages."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
 
-from composer.base.diagnostics import suggestion
-from composer.interfaces import FLOATS, TEXTS, Field, FieldType, Message
-from composer.interfaces.field_types.constants import (
-    constant_problem,
-    enumerator_problem,
-    enumerators,
-)
+from composer.interfaces import Field, FieldType, Message
+from composer.interfaces.field_types.constants import constant_problem, enumerator_problem
 from composer.python_code.checks.scopes import NodeScope
 from composer.python_code.problems import Family, Problem
 from composer.python_code.trees import dotted, span_of
+
+_EQUALITY = (ast.Eq, ast.NotEq, ast.In, ast.NotIn)
 
 
 def message_problems(scope: NodeScope) -> Iterator[Problem]:
@@ -31,15 +28,10 @@ def message_problems(scope: NodeScope) -> Iterator[Problem]:
                 message = scope.message_class(function)
                 if message is not None:
                     yield from _keyword_problems(message, keywords, scope)
-            case ast.Subscript(value=owner, slice=index):
-                yield from _index_problem(owner, index, scope)
-            case ast.Compare(
-                left=left,
-                ops=[ast.Eq() | ast.NotEq() | ast.In() | ast.NotIn()],
-                comparators=[right],
-            ):
-                yield from _comparison(left, getattr(right, "elts", [right]), scope)
-                yield from _comparison(right, [left], scope)
+            case ast.Compare(left=left, ops=[operator], comparators=[right]):
+                found = scope.field(left) if isinstance(operator, _EQUALITY) else None
+                for other in getattr(right, "elts", [right]):
+                    yield from _enumerator_problem(found, other, scope)
 
 
 def _keyword_problems(
@@ -57,7 +49,7 @@ def _field_problems(
     if found is None:
         return
     problems = list(_value_problems(node, found[1].type, scope))
-    yield from problems or _enumerator_problem(*found, node, scope)
+    yield from problems or _enumerator_problem(found, node, scope)
     if found[1].name.endswith("frame_id"):
         yield from _frame_problem(node, scope)
 
@@ -78,24 +70,17 @@ def _value_problems(node: ast.expr, type_: object, scope: NodeScope) -> Iterator
     """Yield why an expression does not fit a field or an element of ``type_``."""
     if not isinstance(type_, FieldType):
         return
-    if isinstance(node, ast.IfExp):
-        for part in (node.body, node.orelse):
-            if not isinstance(part, ast.IfExp):  # they may be nested deeply
-                yield from _value_problems(part, type_, scope)
-    elif type_.is_array:
+    if type_.is_array:
         yield from _array_problems(node, type_, scope)
     else:
         value = scope.constant(node)
         # In Python, values of type byte are bytes, and those of type bool are integers.
-        if value is None or isinstance(value, bool | bytes) or type_.name in ("bool", "byte"):
+        is_number = type_.is_primitive and type_.name not in ("bool", "byte")
+        if value is None or isinstance(value, bool | bytes) or not is_number:
             return
         found = constant_problem(value, type_, scope.code.interfaces)
-        if not type_.is_primitive:
-            found = (f"{value} where {type_} is expected", None)
-        elif isinstance(value, int) and type_.name in FLOATS:
-            found = (f"{type_} must be a float, not the integer {value}", f"write {value}.0")
         if found is not None:
-            yield scope.problem(Family.VALUE, found[0], node, found[1])
+            yield Problem(Family.VALUE, found[0], span_of(node, scope.source), found[1])
 
 
 def _array_problems(node: ast.expr, type_: FieldType, scope: NodeScope) -> Iterator[Problem]:
@@ -105,7 +90,8 @@ def _array_problems(node: ast.expr, type_: FieldType, scope: NodeScope) -> Itera
         (size is not None and count != size) or (bound is not None and count > bound)
     ):
         elements = f"{count} element" + ("" if count == 1 else "s")
-        yield scope.problem(Family.VALUE, f"{elements} where {type_} is expected", node)
+        message = f"{elements} where {type_} is expected"
+        yield Problem(Family.VALUE, message, span_of(node, scope.source))
         return
     items = [node.elt] if isinstance(node, ast.ListComp) else getattr(node, "elts", ())
     for item in items if isinstance(node, ast.List | ast.Tuple | ast.ListComp) else ():
@@ -124,54 +110,16 @@ def _length(node: ast.expr, scope: NodeScope) -> int | None:
         case ast.BinOp(left=ast.List() as repeated, op=ast.Mult(), right=factor):
             length, times = _length(repeated, scope), scope.constant(factor)
             return length * times if length is not None and isinstance(times, int) else None
-        case ast.Attribute():
-            array = scope.type(node)
-            return array.array_size if isinstance(array, FieldType) else None
     return None
 
 
-def _index_problem(owner: ast.expr, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
-    at = scope.constant(index)
-    array = scope.type(owner) if isinstance(at, int) else None
-    size = array.array_size if isinstance(array, FieldType) else None
-    if isinstance(at, int) and size is not None and not -size <= at < size:
-        hint = f"indices count from 0, so the last one is {size - 1}"
-        yield scope.problem(Family.INDEX, f"{array} has no element {at}", index, hint)
-
-
-def _comparison(left: ast.expr, others: list[ast.expr], scope: NodeScope) -> Iterator[Problem]:
-    """Yield the values that a field never has, among those that it is compared with."""
-    found = scope.field(left) if isinstance(left, ast.Attribute) else None
-    if found is None or found[1].type.is_array or not found[1].type.is_primitive:
-        return
-    type_ = found[1].type
-    is_text = type_.name in TEXTS
-    for other in others:
-        value = scope.constant(other)
-        if isinstance(value, str) and not is_text:
-            yield scope.doubt(f"{type_} is never equal to a string", other)
-        elif isinstance(value, int | float) and (is_text or type_.name == "byte"):
-            yield scope.doubt(f"{type_} is never equal to a number", other)
-        else:
-            yield from _enumerator_problem(*found, other, scope)
-
-
 def _enumerator_problem(
-    message: Message, field: Field, node: ast.expr, scope: NodeScope
+    found: tuple[Message, Field] | None, node: ast.expr, scope: NodeScope
 ) -> Iterator[Problem]:
-    """Yield why a value is none of the constants for a field."""
-    if field.type.is_array:
+    """Yield why a value is none of the constants for a field; the code does not fail."""
+    if found is None or found[1].type.is_array:
         return
-    found = enumerator_problem(message, field.name, scope.constant(node))
-    owner = scope.message_class(node.value) if isinstance(node, ast.Attribute) else None
-    if found is not None:
-        yield scope.doubt(found[0], node, found[1])
-    elif isinstance(node, ast.Attribute) and owner is not None:
-        known = enumerators(message, field.name)
-        if (
-            known
-            and node.attr not in known
-            and any(item.name == node.attr for item in owner.constants)
-        ):
-            text = f"{owner.name} defines {node.attr} for another field than '{field.name}'"
-            yield scope.doubt(text, node, suggestion(node.attr, known))
+    problem = enumerator_problem(found[0], found[1].name, scope.constant(node))
+    if problem is not None:
+        span = span_of(node, scope.source)
+        yield Problem(Family.VALUE, problem[0], span, problem[1], is_certain=False)

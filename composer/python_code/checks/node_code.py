@@ -3,45 +3,35 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 
-from composer.base.diagnostics import nearest, suggestion
+from composer.base.diagnostics import nearest
 from composer.interfaces import Interfaces
-from composer.interfaces.field_types.types import STATUS, Word
 from composer.model import Node
+from composer.python_code.checker.callbacks import TRANSITIONS
 from composer.python_code.checks.messages import message_problems
 from composer.python_code.checks.scopes import Code, NodeScope
 from composer.python_code.lookup import BehaviorSource, imported_from, is_of_rclpy
 from composer.python_code.nodes import (
-    UNDECLARED,
     calls_on_self,
     declared_parameters,
-    passes_node_on,
     published_port,
     reached_methods,
 )
 from composer.python_code.problems import Family, Problem
 from composer.python_code.stubs.behaviors import PORT_ATTRIBUTES
 from composer.python_code.syntax import Method
-from composer.python_code.trees import SCOPES, argument, called_name, catches, dotted, span_of, walk
+from composer.python_code.trees import SCOPES, argument, span_of, walk
 
 #: The attributes that the composer sets after the constructor.
 _SET_LATER = frozenset(
     {"clock", "fail", "log", "node", "parameters", "transforms", *PORT_ATTRIBUTES}
 )
-#: Texts that show that a file may run an event loop of asyncio, such as in a thread.
-_RUNS_ASYNCIO = (
-    "asyncio.run",  # and run_coroutine_threadsafe
-    "run_until_complete",
-    "run_forever",
-    "asyncio.Runner",
-    "event_loop",
-)
+#: Text that shows that a file may run an event loop of asyncio, such as in a thread.
+_RUNS_ASYNCIO = re.compile(r"asyncio\.(?:run|Runner)|run_until_complete|run_forever|event_loop")
 #: The parameters that every node has.
 _DECLARED = frozenset({"use_sim_time", "start_type_description_service"})
-_READING = frozenset({"describe_parameter", "get_parameter", "get_parameter_type"})
-_ERRORS = frozenset({"Exception", "ParameterException", "ParameterNotDeclaredException"})
-_TRANSITIONS = frozenset({"activate", "cleanup", "configure", "deactivate", "error", "shutdown"})
 
 
 def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) -> Iterator[Problem]:
@@ -57,23 +47,15 @@ def code_problems(node: Node, source: BehaviorSource, interfaces: Interfaces) ->
 
 
 def _calls(scope: NodeScope, *, is_behavior: bool) -> Iterator[Problem]:
-    """Yield awaited functions of asyncio, and QoS profiles that rclpy refuses."""
-    runs_asyncio = any(text in scope.source.text for text in _RUNS_ASYNCIO)
-    instead = "call self.get_clock().sleep_for, or await a Future that a timer completes"
-    if is_behavior:
-        instead = "use self.clock.sleep"
+    """Yield awaited functions of asyncio, whose event loop does not run."""
+    runs_asyncio = _RUNS_ASYNCIO.search(scope.source.text) is not None
     for call in scope.calls:
         is_pause = scope.constant(argument(call.node, 0, "delay")) == 0  # needs no event loop
-        given = {item.arg for item in call.node.keywords}
         if call.awaited and call.name.startswith("asyncio.") and not (runs_asyncio or is_pause):
             message = f"'{call.name}' needs the event loop of asyncio, which does not run here"
-            hint = instead if call.name == "asyncio.sleep" else None
+            is_sleep = is_behavior and call.name == "asyncio.sleep"
+            hint = "use self.clock.sleep" if is_sleep else None
             yield Problem(Family.ASYNCIO, message, call.span, hint)
-        elif call.name == "rclpy.qos.QoSProfile" and not (
-            call.node.args or given & {"depth", "history", None}
-        ):
-            message = "a QoSProfile needs its depth or its history"
-            yield scope.problem(Family.ARGUMENTS, message, call.node, "add 'depth=10'")
 
 
 def _behavior_problems(code: Code) -> Iterator[Problem]:
@@ -83,16 +65,6 @@ def _behavior_problems(code: Code) -> Iterator[Problem]:
         method = code.source.method(name)
         for reached in reached_methods(code.source, method) if method is not None else ():
             yield from _early_calls(name, reached, code)
-    for scope in code.scopes:
-        for node in scope.nodes:
-            match node:
-                case ast.Subscript(value=ast.Attribute() as owner, slice=index):
-                    yield from _key(dotted(owner), index, scope)
-                case ast.Compare(left=left, ops=[ast.Eq() | ast.NotEq()], comparators=[right]):
-                    word = _word(left, scope)
-                    problem = word.problem(scope.constant(right)) if word is not None else None
-                    if problem is not None:
-                        yield scope.doubt(problem[0], right, problem[1])
 
 
 def _early_attributes(code: Code) -> Iterator[Problem]:
@@ -133,35 +105,6 @@ def _early_calls(handler: str, method: Method, code: Code) -> Iterator[Problem]:
             yield Problem(Family.EARLY, message, call.span, hint)
 
 
-def _key(owner: str, index: ast.expr, scope: NodeScope) -> Iterator[Problem]:
-    """Yield the constant keys of ports and parameters that the node does not have."""
-    node, key = scope.code.node, scope.constant(index)
-    section = owner.removeprefix("self.") if scope.class_ is not None and node.complete else ""
-    kind, names = "parameter", [item.name.value for item in node.parameters]
-    if section in PORT_ATTRIBUTES:
-        kind = PORT_ATTRIBUTES[section].value
-        names = [item.name.value for item in node.ports_of(PORT_ATTRIBUTES[section])]
-    elif owner != "self.parameters":
-        return
-    if isinstance(key, str) and key not in names:
-        message = f"the node has no {kind} '{key}'"
-        yield scope.problem(Family.PORT, message, index, suggestion(key, names))
-
-
-def _word(node: ast.expr, scope: NodeScope) -> Word | None:
-    """Return the type of a parameter with choices, or of the status of a goal."""
-    match node:
-        case ast.Attribute(value=ast.Attribute(value=ast.Name(id="self"), attr="parameters")):
-            parameter = scope.code.node.parameter(node.attr)
-            if parameter is not None and parameter.choices is not None:
-                return Word("string", words=tuple(map(str, parameter.choices.value)))
-        case ast.Attribute(value=ast.Name(id=name), attr="status"):
-            match scope.value(name):
-                case ast.Await(value=ast.Call(func=ast.Attribute(attr="result"))):
-                    return STATUS
-    return None
-
-
 def _node_class_problems(code: Code) -> Iterator[Problem]:
     """Yield what is wrong about a class that is derived from rclpy's Node."""
     yield from _missing_calls(code)
@@ -171,39 +114,20 @@ def _node_class_problems(code: Code) -> Iterator[Problem]:
 
 
 def _undeclared(code: Code) -> Iterator[Problem]:
-    """Yield the parameters that methods read, but that no file declares."""
+    """Yield the parameters that methods read under a name close to a declared one.
+
+    Other names may be declared by code that is not read.
+    """
     parameters = declared_parameters(code.source)
-    hosted = code.node.hosted_class
-    given = {name.value for name, _ in hosted.arguments} if hosted is not None else set()
-    if not parameters.is_complete or not UNDECLARED.isdisjoint(given):
-        return
-    if any(map(_has_other_options, code.scopes)):
-        return
     declared = _DECLARED | parameters.types.keys()
-    is_shared = passes_node_on(code.source)
-    own = {module.source for module in code.source.own_modules}
-    for scope, call, method in calls_on_self(code.source):
-        name = argument(call, 0, "name") if method in _READING and scope.source in own else None
+    for scope, call, method in calls_on_self(code.source) if parameters.is_complete else ():
+        name = argument(call, 0, "name") if method == "get_parameter" else None
         read = scope.known(scope.text, name)
-        if name is None or read is None or read in declared or read.startswith("qos_overrides."):
-            continue
-        close = nearest(read, declared)
-        is_caught = any(
-            isinstance(x, ast.ExceptHandler) and catches(x, _ERRORS) for x in scope.nodes
-        )
-        if (close or not is_shared) and not is_caught:
-            hint = f"did you mean '{close}'?" if close else f"call declare_parameter('{read}')"
+        close = nearest(read, declared - {read}) if read is not None else None
+        if name is not None and read not in declared and close is not None:
             message = f"the class does not declare the parameter '{read}'"
+            hint = f"did you mean '{close}'?"
             yield Problem(Family.PARAMETER, message, span_of(name, scope.source), hint)
-
-
-def _has_other_options(scope: NodeScope) -> bool:
-    """Return whether a constructor gets options from elsewhere than from the node's arguments."""
-    own = scope.function.args.kwarg if scope.function is not None else None
-    passed_on = own.arg if own is not None else None
-    calls = (x for x in scope.nodes if isinstance(x, ast.Call) and called_name(x) == "__init__")
-    options = (item for call in calls for item in call.keywords if item.arg is None)
-    return any(dotted(item.value) != passed_on for item in options)
 
 
 def _missing_calls(code: Code) -> Iterator[Problem]:
@@ -225,7 +149,7 @@ def _missing_calls(code: Code) -> Iterator[Problem]:
                 message = f"the constructor of '{class_.name}' does not call that of {origin.name}"
                 hint = "begin with super().__init__('name_of_the_node')"
                 yield Problem(Family.CONSTRUCTOR, message, method.span, hint)
-            if origin.name != "LifecycleNode" or transition not in _TRANSITIONS:
+            if origin.name != "LifecycleNode" or transition not in TRANSITIONS:
                 continue
             if not method.accepts(1):
                 takes = ", ".join(("self", *method.arguments))

@@ -19,10 +19,8 @@ from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.checker.callbacks import callback_signatures
 from composer.python_code.lookup import BehaviorSource
-from composer.python_code.problems import Family, Problem
 from composer.python_code.scopes import Scope
-from composer.python_code.stubs.behaviors import signatures
-from composer.python_code.trees import Function, bindings, positional_arguments, span_of
+from composer.python_code.trees import Function, bindings, positional_arguments
 
 #: Maximum number of names and fields to follow.
 _MAXIMUM_STEPS = 16
@@ -41,10 +39,7 @@ class Code:
         """All files and functions."""
         own: dict[ast.AST | None, tuple[ast.ClassDef, Mapping[str, str]]] = {}
         for module, class_ in self.source.own_classes:
-            if self.node.hosted_class is not None:
-                known = callback_signatures(class_.node, module)
-            else:
-                known = signatures(self.node, self.interfaces)
+            known = callback_signatures(class_.node, module, self.node, self.interfaces)
             for method in class_.methods:
                 signature = known.get(method.name)
                 types = [type_ for _, type_ in signature.arguments] if signature else []
@@ -76,16 +71,6 @@ class NodeScope(Scope):
 
     code: Code = field(kw_only=True, repr=False)
     passed: Mapping[str, str] = field(default_factory=dict)
-
-    def problem(
-        self, family: Family, message: str, place: ast.expr, hint: str | None = None
-    ) -> Problem:
-        """Return a problem at an expression."""
-        return Problem(family, message, span_of(place, self.source), hint)
-
-    def doubt(self, message: str, place: ast.expr, hint: str | None = None) -> Problem:
-        """Return the problem of a value that is probably wrong, but does not fail."""
-        return Problem(Family.VALUE, message, span_of(place, self.source), hint, is_certain=False)
 
     def constant(self, node: ast.expr | None) -> str | int | float | None:
         """Return the value of a number or text, None if it is not known."""

@@ -108,7 +108,7 @@ def signatures(node: Node, interfaces: Interfaces) -> dict[str, Signature]:
     return {name: item for name, item in found.items() if name.isidentifier()}
 
 
-def member_class_name(behavior: str, attribute: str) -> str:
+def _member_class_name(behavior: str, attribute: str) -> str:
     """Return the name of the class of ``self.publishers`` or of another group of members."""
     title = attribute.title().replace("_", "")
     return f"{behavior.removesuffix(SUFFIX)}{title}"
@@ -118,16 +118,16 @@ def _class(name: str, node: Node, interfaces: Interfaces) -> Iterator[str]:
     groups = {attribute: _ports(node, attribute, interfaces) for attribute in PORT_ATTRIBUTES}
     descriptions = {port.name.value: port.description for port in node.ports}
     for attribute, members in groups.items():
-        yield f"class {member_class_name(name, attribute)}:"
+        yield f"class {_member_class_name(name, attribute)}:"
         yield from _properties(members, descriptions)
         yield "    def __getitem__(self, name: str, /) -> Any: ..."
-    yield f"class {member_class_name(name, 'parameters')}:"
+    yield f"class {_member_class_name(name, 'parameters')}:"
     yield from _parameters(node)
     yield f"class {name}(composer.behavior.Behavior):"
     if node.description:
         yield f"    {_docstring(node.description)}"
     for attribute in (*groups, "parameters"):
-        yield f"    {attribute}: {member_class_name(name, attribute)}"
+        yield f"    {attribute}: {_member_class_name(name, attribute)}"
     for handler, signature in signatures(node, interfaces).items():
         arguments = "".join(f", {argument}: {type_}" for argument, type_ in signature.arguments)
         if arguments:

@@ -9,7 +9,7 @@ class Robot:
         self.publishers.comand.publish(String())
         self.publishers.command.publsh(String())
         self.publishers.reset.publish(String())
-        self.log.info(str(self.parameters.sped + self.parameters["velocity"]))
+        self.log.info(str(self.parameters.sped))
         self.cuont += 1
         self.log.warning("done")
         self.timers.tick.cancel()

@@ -6,25 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.support.python_checks import check, problems
+from tests.unit.support.python_checks import check
 
 FILES = [
-    """
-    class Robot:
-        async def on_tick(self):
-            sent = await self.action_clients.count.send_goal(None)
-            outcome = await sent.result()
-            if outcome.status == "success":  # VALUE?
-                return
-            if outcome.status == "succeeded" or sent.status == "success":
-                return
-            if self.parameters.mode == "slow":
-                return
-            if "fats" != self.parameters.mode or self.parameters.mode == "fats":  # VALUE?
-                return
-            if self.parameters.frame == "fats":
-                return
-    """,
     """
     class Robot:
         def __init__(self):
@@ -119,17 +103,6 @@ FILES = [
     """,
     """
     class Robot:
-        def on_tick(self):
-            self.parameters["limt"]  # PORT
-            self.parameters["limit"]
-            self.publishers["velocities"].publish(None)  # PORT
-            self.publishers["velocity"].publish(None)
-            self.clients["velocity"]  # PORT
-            self.other["limt"]
-            self.parameters[self.name]
-    """,
-    """
-    class Robot:
         async def on_tick(self):
             goal = await self.action_clients.count.send_goal(None, on_feedback=self.show)
             await self.action_clients.count.send_goal(None, on_feedback=lambda: 1)
@@ -156,18 +129,3 @@ FILES = [
 @pytest.mark.parametrize("text", FILES)
 def test_behaviors(text: str, tmp_path: Path) -> None:
     check(text, tmp_path, "behavior")
-
-
-def test_texts(tmp_path: Path) -> None:
-    text = """
-    class Robot:
-        def on_configure(self):
-            self.publishers.velocity.publish(self.parameters["limt"])
-    """
-    assert {(item.message, item.hint) for item in problems(text, tmp_path, "behavior")} == {
-        (
-            "'on_configure' runs while the node is not active: the message is dropped",
-            "move it to on_activate",
-        ),
-        ("the node has no parameter 'limt'", "did you mean 'limit'?"),
-    }

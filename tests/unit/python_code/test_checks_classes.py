@@ -17,7 +17,7 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
-from std_msgs.msg import String
+from std_msgs.msg import String, UInt8
 from std_srvs.srv import SetBool, Trigger
 from tf2_ros import Buffer, TransformListener
 
@@ -72,14 +72,15 @@ PARAMETERS = [
     self.declare_parameters('', [('rate', 1.0), ('name', 'a')])
     self.declare_parameters('arm', [('rate', 1.0)])
     self.get_parameter('arm.rate').value
-    self.get_parameter('arm.name').value  # PARAMETER
+    self.get_parameter('arm.rat').value  # PARAMETER
+    self.get_parameter('arm.color').value
     """,
     """
     RATE = 'rate'
     self.declare_parameter(RATE, 1.0)
     self.get_parameter('rate').value
     self.buffer = TransformListener(Buffer(), self)
-    self.get_parameter('name').value  # PARAMETER
+    self.get_parameter('rates').value  # PARAMETER
     """,
     """
     for name in self.names:
@@ -94,12 +95,6 @@ PARAMETERS = [
     """
     helper.declare(self)
     self.get_parameter('rate').value
-    """,
-    """
-    try:
-        self.get_parameter('rate').value
-    except Exception:
-        pass
     """,
     """
     if self.has_parameter('rate'):
@@ -150,7 +145,8 @@ FILES = [
     class Robot(Node):
         def __init__(self, **kwargs):
             super().__init__('robot', **kwargs)
-            self.get_parameter('rate').value  # PARAMETER
+            self.declare_parameter('rate', 1.0)
+            self.get_parameter('rates').value  # PARAMETER
     """,
     """
     class Robot(Node):
@@ -233,30 +229,10 @@ FILES = [
     class Robot(Node):
         def __init__(self):
             super().__init__('robot')
-            self.create_subscription(String, 'a', self.on_a, 10)
+            self.create_subscription(UInt8, 'a', self.on_a, 10)
 
         def on_a(self, message):
-            if message.data == 3:  # VALUE?
-                pass
-    """,
-    """
-    import json
-
-    class Robot(Node):
-        def __init__(self):
-            kwargs = json.loads('{}')
-            super().__init__('robot', **kwargs)
-            self.get_parameter('rate')
-    """,
-    """
-    from types import SimpleNamespace
-
-    class Robot(Node):
-        def __init__(self):
-            super().__init__('robot')
-            self.helper = SimpleNamespace()
-            self.helper.node = self
-            self.get_parameter('rate')
+            message.data = 300  # VALUE
     """,
 ]
 
