@@ -36,8 +36,6 @@ _UNDECLARED = frozenset(
     {"allow_undeclared_parameters", "automatically_declare_parameters_from_overrides"}
     | {"get_parameters_by_prefix", "has_parameter"}
 )
-#: Packages whose functions take a node and declare no parameters of the class.
-_OF_ROS = frozenset({"message_filters", "rclpy", "tf2_ros"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,25 +220,6 @@ def _pair(item: ast.expr) -> tuple[ast.expr | None, ast.expr | None]:
         case ast.Tuple(elts=[name]):
             return name, None
     return None, None
-
-
-def passes_node_on(source: BehaviorSource, harmless: frozenset[str] = _OF_ROS) -> bool:
-    """Return whether a class passes its object to other code than some packages."""
-    return any(_passes_on(scope, harmless) for scope in scopes_in(source.classes))
-
-
-def _passes_on(scope: Scope, harmless: frozenset[str]) -> bool:
-    uses = 0
-    for node in scope.nodes:
-        match node:
-            case ast.Name(id="self"):
-                uses += 1
-            case ast.Attribute(value=ast.Name(id="self")):
-                uses -= 1
-            case ast.Call() if scope.full_name(node.func).partition(".")[0] in harmless:
-                given = [*node.args, *(keyword.value for keyword in node.keywords)]
-                uses -= sum(getattr(item, "id", None) == "self" for item in given)
-    return uses > 0
 
 
 def calls_on_self(source: BehaviorSource) -> Iterator[tuple[Scope, ast.Call, str]]:

@@ -17,8 +17,13 @@ from composer.model import (
     PortKind,
 )
 from composer.model.qos import incompatibilities
-from composer.python_code.nodes import declared_parameters, passes_node_on
-from composer.rules.analysis.class_ports import CreatedPort, all_created_ports, created_ports
+from composer.python_code.nodes import declared_parameters
+from composer.rules.analysis.class_ports import (
+    CreatedPort,
+    all_created_ports,
+    created_ports,
+    passes_node_on,
+)
 from composer.rules.analysis.context import ClassOfNode, Context, distinct_classes, hosted_classes
 from composer.rules.analysis.subjects import type_subject
 from composer.rules.python import as_warning

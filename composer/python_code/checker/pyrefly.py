@@ -12,11 +12,14 @@ import sys
 import tempfile
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import ExitStack, suppress
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
+from composer.base.kept_result import KeptResult
 from composer.python_code.problems import CheckerFailed
+from composer.python_code.stubs.folder import LIBRARIES
 
 #: The kinds that may be mistakes; the others are about annotations and definitions.
 _KINDS = (
@@ -65,13 +68,16 @@ class Finding:
 
 @dataclass(slots=True)
 class Run:
-    """A run of the checker in the background."""
+    """A run of the checker: a process in the background, unless its output is kept already."""
 
-    _folder: tempfile.TemporaryDirectory[str]
-    _process: subprocess.Popen[bytes]
+    _output: KeptResult
+    _folder: tempfile.TemporaryDirectory[str] | None = None
+    _process: subprocess.Popen[bytes] | None = None
 
     def findings(self) -> list[Finding]:
         """Wait for what the checker finds. Raises CheckerFailed."""
+        if self._folder is None or self._process is None:
+            return _findings(self._output.data or b"", b"", 0)
         try:
             self._process.wait(timeout=TIME_LIMIT_S)
             output, errors = (Path(self._folder.name, name).read_bytes() for name in _OUTPUTS)
@@ -81,10 +87,14 @@ class Run:
             raise CheckerFailed(f"its output is lost: {error.strerror}") from None
         finally:
             self.close()
-        return _findings(output, errors, self._process.returncode)
+        found = _findings(output, errors, self._process.returncode)
+        self._output.keep(output)
+        return found
 
     def close(self) -> None:
         """End the process and remove its files."""
+        if self._folder is None or self._process is None:
+            return
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait()
@@ -92,12 +102,18 @@ class Run:
 
 
 def start(files: Mapping[str, str], checked: Collection[str], search_paths: Iterable[str]) -> Run:
-    """Start to check files.
+    """Start to check files, unless the same files have been checked before.
 
     ``checked`` are the files to report about, ``search_paths`` the folders to import from. All
     are relative to a private folder that the files are written into. Raises CheckerFailed.
     """
-    command = [_program(), *_options(search_paths), "--", *checked]
+    options = [*_options(search_paths), "--", *checked]
+    installed = (*map(Path, package_folders()), *LIBRARIES.rglob("*.pyi"))
+    times = sorted(f"{path} {path.stat().st_mtime_ns}" for path in installed)
+    kept = KeptResult("checks", (*options, *times, *chain.from_iterable(files.items())))
+    if kept.data is not None:
+        return Run(kept)
+    command = [_program(), *options]
     try:
         folder = tempfile.TemporaryDirectory(prefix="compose-", ignore_cleanup_errors=True)
     except OSError as error:
@@ -109,7 +125,7 @@ def start(files: Mapping[str, str], checked: Collection[str], search_paths: Iter
         raise CheckerFailed(f"it cannot be started: {error.strerror}") from None
     size = sum(len(files[name]) for name in checked)
     _limit(process.pid, _CPU_S + _CPU_S_PER_MB * size // 1_000_000)
-    return Run(folder, process)
+    return Run(kept, folder, process)
 
 
 def _popen(command: list[str], root: Path, files: Mapping[str, str]) -> subprocess.Popen[bytes]:
@@ -180,14 +196,12 @@ def _findings(output: bytes, errors: bytes, code: int) -> list[Finding]:
         raise CheckerFailed("it needed too much processor time")
     if code < 0:
         raise CheckerFailed(f"it was ended by {signal.Signals(-code).name}")
-    try:
-        found: list[dict[str, Any]] = json.loads(output)["errors"]
-    except (ValueError, KeyError, TypeError, RecursionError):
-        lines = errors.decode(errors="replace").strip().splitlines() or [f"exit code {code}"]
-        raise CheckerFailed(f"it failed: {lines[-1][:200]}") from None
     names = ("path", "line", "column", "stop_line", "stop_column", "name", "description")
     try:
-        reported = [item for item in found if item["severity"] in ("error", "warn")]
-        return [Finding(*(item[name] for name in names)) for item in reported]
-    except (KeyError, TypeError):
-        raise CheckerFailed("its output has an unknown form") from None
+        reported: list[dict[str, Any]] = json.loads(output)["errors"]
+        certain = (item for item in reported if item["severity"] in ("error", "warn"))
+        return [Finding(*(item[name] for name in names)) for item in certain]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        lines = errors.decode(errors="replace").strip().splitlines()
+        reason = lines[-1][:200] if lines else f"exit code {code}, and no output of the known form"
+        raise CheckerFailed(f"it failed: {reason}") from None

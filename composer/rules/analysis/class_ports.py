@@ -11,8 +11,9 @@ from composer.base.source import Span
 from composer.model import PortKind
 from composer.model.qos import DURATIONS, PRESETS, WORDS, QosProfile
 from composer.python_code.lookup import BehaviorSource
-from composer.python_code.nodes import calls_on_self, passes_node_on
+from composer.python_code.nodes import calls_on_self
 from composer.python_code.scopes import NotLiteral, Scope
+from composer.python_code.syntax import scopes_in
 from composer.python_code.trees import argument, dotted, span_of, walk
 
 _TOPIC = ("msg_type", "topic", "qos_profile")
@@ -28,6 +29,8 @@ CREATORS: dict[str, tuple[PortKind, tuple[str, ...]]] = {
     "create_service": (PortKind.SERVICE, _SERVICE),
     "create_client": (PortKind.CLIENT, _SERVICE),
 }
+#: Packages whose functions take a node and declare no parameters of the class.
+_OF_ROS = frozenset({"message_filters", "rclpy", "tf2_ros"})
 #: How rclpy names its profiles: ``qos_profile_sensor_data`` or ``QoSPresetProfiles.SENSOR_DATA``.
 _QOS_NAMES = {
     name: preset
@@ -89,6 +92,25 @@ def _overridable(scope: Scope, call: ast.Call) -> frozenset[str]:
         if len(names) == len(kinds.elts):
             return frozenset(_DURATIONS.get(name, name) for name in names)
     return frozenset({*WORDS, *_DURATIONS.values(), "depth"})
+
+
+def passes_node_on(source: BehaviorSource, harmless: frozenset[str] = _OF_ROS) -> bool:
+    """Return whether a class passes its object to other code than some packages."""
+    return any(_passes_on(scope, harmless) for scope in scopes_in(source.classes))
+
+
+def _passes_on(scope: Scope, harmless: frozenset[str]) -> bool:
+    uses = 0
+    for node in scope.nodes:
+        match node:
+            case ast.Name(id="self"):
+                uses += 1
+            case ast.Attribute(value=ast.Name(id="self")):
+                uses -= 1
+            case ast.Call() if scope.full_name(node.func).partition(".")[0] in harmless:
+                given = [*node.args, *(keyword.value for keyword in node.keywords)]
+                uses -= sum(getattr(item, "id", None) == "self" for item in given)
+    return uses > 0
 
 
 def all_created_ports(source: BehaviorSource) -> list[CreatedPort] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -26,9 +27,12 @@ class Counter:
 BAD_CHECKERS = {
     "crashes": ("os.kill(os.getpid(), signal.SIGSEGV)", "it was ended by SIGSEGV"),
     "fails": ("sys.exit('out of luck')", "it failed: out of luck"),
-    "prints half of it": ("print('{')", "it failed: exit code 0"),
-    "prints another form": ("print('{\"errors\": [{}]}')", "its output has an unknown form"),
-    "prints deep JSON": ("print('{\"errors\":' + '[' * 100_000)", "it failed: exit code 0"),
+    "prints half of it": ("print('{')", "it failed: exit code 0, and no output"),
+    "prints another form": ("print('{\"errors\": [{}]}')", "it failed: exit code 0, and no output"),
+    "prints deep JSON": (
+        "print('{\"errors\":' + '[' * 100_000)",
+        "it failed: exit code 0, and no output",
+    ),
     "never ends": ("time.sleep(600)", "it took longer than 2 s"),
     "computes": ("signal.raise_signal(signal.SIGXCPU)", "it needed too much processor time"),
     "wants memory": ("time.sleep(0.2); bytearray(3_000_000_000)", "it failed: MemoryError"),
@@ -52,6 +56,7 @@ def test_checker_that_fails_is_a_note(
     monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
     if "took longer" in reason:  # the others end by themselves
         monkeypatch.setattr(pyrefly, "TIME_LIMIT_S", 2.0)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "code.py").write_text(CODE % name)
     found = diagnostics_in(SYSTEM, tmp_path)
     assert [(item.rule.name, item.severity) for item in found] == [("not-checked", Severity.INFO)]
@@ -62,9 +67,26 @@ def test_project_without_the_checker_is_checked_by_the_rules(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "code.py").write_text("class Counter:\n    def on_tik(self):\n        pass\n")
     found = [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)]
     assert sorted(found) == ["missing-handler", "not-checked"]
+
+
+def test_problems_of_unchanged_files_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "code.py").write_text(CODE % "kept")
+    found = diagnostics_in(SYSTEM, tmp_path)
+    assert [item.rule.name for item in found] == ["unknown-attribute"]
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))  # without the checker
+    assert diagnostics_in(SYSTEM, tmp_path) == found
+    (entry,) = (tmp_path / "ros2-composer" / "checks").iterdir()
+    content = entry.read_bytes()
+    for damaged in (b"", b"\xff", content[:-1], content[:40] + b"x" + content[41:]):
+        entry.write_bytes(damaged)
+        assert [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)] == ["not-checked"]
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 12), reason="this Python parses the file")
@@ -96,11 +118,15 @@ PROBLEMS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("begin", "line"), PROBLEMS.values(), ids=PROBLEMS)
-def test_growth_with_problems(begin: str, line: str, tmp_path: Path) -> None:
+def test_growth_with_problems(
+    begin: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
     def check(count: int) -> None:
         head = "from std_msgs.msg import String\nclass Counter:\n"
         lines = "".join(line.replace("#", str(number)) for number in range(count))
-        (tmp_path / "code.py").write_text(f"{head}{begin}{lines}")
+        (tmp_path / "code.py").write_text(f"{head}{begin}{lines}# {time.monotonic_ns()}\n")
         found = diagnostics_in(SYSTEM, tmp_path)
         is_limited = any("the rest is not shown" in item.message for item in found)
         assert is_limited == (count > check_module.MAX_FINDINGS)
