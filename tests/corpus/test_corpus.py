@@ -52,7 +52,7 @@ MEASURED = {
 MEASURED_CODE = {
     "robots": (0.95, 1.04, 0.98),
     "vehicles": (0.91, 1.04, 0.98),
-    "machines": (0.90, 1.08, 0.85),
+    "machines": (0.90, 1.08, 0.86),
 }
 MIN_MISTAKES, MIN_VALID = 220, 50
 

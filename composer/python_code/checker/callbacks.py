@@ -11,7 +11,7 @@ from composer.python_code.lookup import imported_from
 from composer.python_code.nodes import Signature
 from composer.python_code.stubs.behaviors import port_type, signatures
 from composer.python_code.syntax import Module
-from composer.python_code.trees import Function, argument, bindings, called_name, dotted
+from composer.python_code.trees import Function, argument, bindings, called_name, dotted, last_name
 
 _HANDLE = "rclpy.action.server.ServerGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
 _SENT_GOAL = "rclpy.action.client.ClientGoalHandle[{0}.Goal, {0}.Result, {0}.Feedback]"
@@ -110,10 +110,18 @@ def _of_call(
 def _bound(
     callback: ast.expr | None, type_: str, signature: Signature
 ) -> Iterator[tuple[str, Signature]]:
-    """Yield the method that is passed as ``self.method``, with its signature."""
+    """Yield the method that is passed as ``self.method``, with its signature.
+
+    Arguments that ``partial(self.method, ...)`` adds have no known type, "".
+    """
+    before: tuple[tuple[str, str], ...] = ()
+    if isinstance(callback, ast.Call) and last_name(callback.func) == "partial" and callback.args:
+        before = (("", ""),) * (len(callback.args) - 1)
+        callback = callback.args[0]
     name = dotted(callback) if callback is not None else ""
     if type_ and name.startswith("self.") and name.count(".") == 1:
-        yield name.removeprefix("self."), signature.of(type_)
+        typed = signature.of(type_)
+        yield name.removeprefix("self."), Signature((*before, *typed.arguments), typed.result)
 
 
 def _only(types: Iterable[str]) -> str:
