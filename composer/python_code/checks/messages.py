@@ -70,7 +70,10 @@ def _value_problems(node: ast.expr, type_: object, scope: NodeScope) -> Iterator
     """Yield why an expression does not fit a field or an element of ``type_``."""
     if not isinstance(type_, FieldType):
         return
-    if type_.is_array:
+    if isinstance(node, ast.IfExp):
+        for part in (node.body, node.orelse):
+            yield from _value_problems(part, type_, scope)
+    elif type_.is_array:
         yield from _array_problems(node, type_, scope)
     else:
         value = scope.constant(node)

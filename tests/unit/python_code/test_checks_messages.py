@@ -32,7 +32,7 @@ WRONG = [
     "message = UInt8MultiArray(data=[1, 256])  # VALUE",
     "message = UInt8MultiArray()\nmessage.data = [256, 300]  # VALUE",
     "message = UInt8MultiArray()\nmessage.data[0] = 256  # VALUE",
-    "UInt8MultiArray(data=[-1 for x in range(3)])  # VALUE",
+    "UInt8MultiArray(data=[3 if x else -1 for x in range(3)])  # VALUE",
     "UInt8(data='3')  # VALUE",
     "UInt8(data=3.0)  # VALUE",
     "String(data=3)  # VALUE",
