@@ -18,7 +18,7 @@ Path: TypeAlias = tuple[str | int, ...]
 
 #: The keywords of a schema that check something, with their values and what checks them.
 _Checks: TypeAlias = list[tuple[str, Any, Callable[..., Any]]]
-#: A schema without reference, its checks, and whether some of them are those of inner values.
+#: A schema without reference, its checks, and whether some of them check inner values.
 _Resolved: TypeAlias = tuple[dict[str, Any], _Checks, bool]
 
 _DEFINITIONS = "#/definitions/"
