@@ -109,7 +109,7 @@ def plain(tree: Tree) -> Plain:
             return [plain(item) for item in tree.items]
         case Mapping():
             found: dict[str, Plain] = {}
-            for entry in tree.entries:
+            for entry in tree.entries:  # most values are scalars: these need no call
                 value = entry.value
                 found[entry.name] = value.value if isinstance(value, Scalar) else plain(value)
             return found
@@ -123,6 +123,7 @@ def count_values(tree: Tree) -> int:
         case Sequence(items=items):
             return 1 + sum(map(count_values, items))
         case Mapping(entries=entries):
+            # Most values are scalars: these need no call.
             inner = [entry.value for entry in entries if not isinstance(entry.value, Scalar)]
             return 1 + 2 * len(entries) - len(inner) + sum(map(count_values, inner))
 

@@ -99,8 +99,12 @@ def external_hint(endpoint: PortOfNode, undescribed: str | None) -> str:
     key = "external: true"
     if port.name.span.file != endpoint.node.span.file:
         key = f"{port.kind.section}: {{{port.name}: {{external: true}}}}"
-    declare = "" if undescribed is None else f"declare it in '{undescribed}' if that node does, or "
-    return f"{declare}set '{key}' if a node outside the system does"
+    outside = f"set '{key}' if a node outside the system does"
+    return outside if undescribed is None else f"{_declare_in(undescribed)}, or {outside}"
+
+
+def _declare_in(undescribed: str) -> str:
+    return f"declare it in '{undescribed}' if that node does"
 
 
 def _is_fully_known(context: Context) -> bool:
@@ -254,7 +258,7 @@ def no_node(
     node = context.once(undescribed_node)
     if node is None or nearest(name, names) is not None:
         return f"no node {does} '{name}'", suggestion(name, names)
-    return f"no node declares that it {does} '{name}'", f"declare it in '{node}' if that node does"
+    return f"no node declares that it {does} '{name}'", _declare_in(node)
 
 
 def undescribed_node(context: Context) -> str | None:

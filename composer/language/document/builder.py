@@ -166,9 +166,7 @@ class TreeBuilder:
         raise Stopped(Diagnostic(rules.YAML_SYNTAX, message, span, hint=hint))
 
     def _on_scalar(self, event: yaml.ScalarEvent) -> None:
-        self._values += 1
-        if self._values > MAX_VALUES:
-            raise self._too_many_values(event.start_mark)
+        self._count(1, event.start_mark)
         scalar = self._scalar(event)
         if event.anchor is not None:
             self._anchors[event.anchor] = _Anchored(scalar, 1, 0)
@@ -183,9 +181,7 @@ class TreeBuilder:
         parent.key = self._key(scalar, event, parent)
 
     def _on_start(self, event: yaml.CollectionStartEvent) -> None:
-        self._values += 1
-        if self._values > MAX_VALUES:
-            raise self._too_many_values(event.start_mark)
+        self._count(1, event.start_mark)
         if event.tag is not None:
             self._report_tag(event.tag, event.start_mark)
         is_map = isinstance(event, yaml.MappingStartEvent)
@@ -221,9 +217,7 @@ class TreeBuilder:
             raise Stopped(
                 Diagnostic(rules.UNSUPPORTED_YAML, message, span, hint="write out the key")
             )
-        self._values += anchored.values
-        if self._values > MAX_VALUES:
-            raise self._too_many_values(event.start_mark)
+        self._count(anchored.values, event.start_mark)
         if len(self._open) + anchored.height > MAX_DEPTH:
             message = f"with '*{name}', values are nested more than {MAX_DEPTH} levels deep"
             raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
@@ -334,9 +328,12 @@ class TreeBuilder:
         message = f"the tag '{shown(tag.replace('tag:yaml.org,2002:', '!!'))}' is not supported"
         self._report(rules.UNSUPPORTED_YAML, message, span_at(self._source, mark), hint)
 
-    def _too_many_values(self, mark: Mark | None) -> Stopped:
-        message = f"this file has more than {MAX_VALUES:,} values"
-        return Stopped(Diagnostic(rules.TOO_LARGE, message, span_at(self._source, mark)))
+    def _count(self, values: int, mark: Mark | None) -> None:
+        self._values += values
+        if self._values > MAX_VALUES:
+            message = f"this file has more than {MAX_VALUES:,} values"
+            span = span_at(self._source, mark)
+            raise Stopped(Diagnostic(rules.TOO_LARGE, message, span))
 
     def _report(self, rule: Rule, message: str, span: Span, hint: str | None) -> None:
         # What else is reported on the line of a key without its value may follow from it.

@@ -106,7 +106,7 @@ def _watch(wakeup: socket.socket, process: int, limit_s: float) -> None:
             # It was woken by something else. Until it reads that, poll returns at once.
             time.sleep(SAME_REQUEST_S / 2)
             continue
-        time.sleep(SAME_REQUEST_S)
+        time.sleep(SAME_REQUEST_S)  # signals that come within this time are one request
         # While this process had no processor, a second request may have arrived.
         is_late = _late_s() - late_s > SAME_REQUEST_S / 2
         number = _unhandled(wakeup, process, limit_s, 1 if is_late else len(_unread(wakeup)))

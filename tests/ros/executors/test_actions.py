@@ -103,7 +103,7 @@ def test_an_early_response_waits_until_its_request_is_registered(
 
     def watched(source: actions.ActionSource, taken: Any) -> None:
         call(source, taken)
-        if source.may_skip:  # that of the client
+        if source.may_skip:  # the source of the client, not of the server
             has_come.set()
 
     monkeypatch.setattr(actions.ActionSource, "call", watched)
