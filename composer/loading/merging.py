@@ -13,7 +13,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
 from composer.language.document import read_document
-from composer.language.document.limits import MAX_ENTRIES
+from composer.language.document.limits import MAX_ENTRIES, MAX_NODES
 from composer.language.expand import expand
 from composer.language.rules import TOO_LARGE
 from composer.language.schema import check_schema, kind_of, kinds
@@ -182,14 +182,15 @@ def _surplus_entry(tree: Mapping) -> Diagnostic | None:
     inner = [section for node in entries(tree.get("nodes")) for section in entries(node.value)]
     frames = (part for item in inner if item.name == "transforms" for part in entries(item.value))
     for section in chain(tree, inner, frames):
+        limit = MAX_NODES if section.name == "nodes" else MAX_ENTRIES
         match section.value:
-            case Mapping(entries=own) if len(own) > MAX_ENTRIES:
-                span = own[MAX_ENTRIES].key.span
-            case ListTree(items=items) if len(items) > MAX_ENTRIES:
-                span = items[MAX_ENTRIES].span
+            case Mapping(entries=own) if len(own) > limit:
+                span = own[limit].key.span
+            case ListTree(items=items) if len(items) > limit:
+                span = items[limit].span
             case _:
                 continue
-        message = f"'{shown(section.name)}' has more than {MAX_ENTRIES:,} entries"
+        message = f"'{shown(section.name)}' has more than {limit:,} entries"
         return Diagnostic(TOO_LARGE, message, span)
     return None
 

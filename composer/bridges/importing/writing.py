@@ -11,7 +11,7 @@ from dataclasses import fields, replace
 from composer.base.characters import escape_lines, is_safe
 from composer.base.source import SourceFile, Span
 from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
-from composer.language.document.limits import MAX_ENTRIES
+from composer.language.document.limits import MAX_NODES
 from composer.language.document.writer import write_document
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
 from composer.launch.variants import with_references
@@ -207,7 +207,7 @@ def readable(found: FoundSystem) -> FoundSystem:
     """
     left_out = list(found.left_out)
     nodes = []
-    for node in found.nodes[:MAX_ENTRIES]:
+    for node in found.nodes[:MAX_NODES]:
         kept = []
         for item in node.parameters:
             what, size = f"parameter {item.name} of {node.full_name}", len(str(item.value))
@@ -221,7 +221,7 @@ def readable(found: FoundSystem) -> FoundSystem:
                 problem = "its value has characters or numbers that a file cannot have"
                 left_out.append(f"{what}: {problem}")
         nodes.append(replace(node, parameters=tuple(kept)))
-    left_out += (f"node {item.full_name}: the file is full" for item in found.nodes[MAX_ENTRIES:])
+    left_out += (f"node {item.full_name}: the file is full" for item in found.nodes[MAX_NODES:])
     return replace(found, nodes=tuple(nodes), left_out=tuple(left_out))
 
 

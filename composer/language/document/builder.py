@@ -55,15 +55,14 @@ def scalar_span(source: SourceFile, event: yaml.ScalarEvent) -> tuple[Span, bool
     if begin is None or end is None:
         return span_at(source, begin), False, 0
     row, start = begin.line, begin.column
-    line = source.lines[row] if row < len(source.lines) else ""
+    length = end.column - start
+    verbatim, offset = True, 0
     if end.line != row or event.style in _BLOCK_STYLES:
-        length = len(line.rstrip()) - start
-        verbatim, offset = False, 0
-    else:
-        stop = end.column
-        length = stop - start
-        offset = 1 if event.style else 0
-        verbatim = line[start + offset : stop - offset] == event.value
+        length = len(source.line(row + 1).rstrip()) - start
+        verbatim = False
+    elif event.style:  # else unquoted, thus without escapes
+        offset = 1
+        verbatim = source.line(row + 1)[start + 1 : end.column - 1] == event.value
     return Span(source, row + 1, start + 1, length if length > 0 else 1), verbatim, offset
 
 

@@ -1,7 +1,7 @@
 """Limits for the size of files, and for the number of errors that are reported of one.
 
-They allow any file written by hand and generated systems of 5 000 nodes. Checking a file of a
-megabyte takes at most about 2.5 seconds of processor time, whatever it contains, and 200 MB.
+They allow any file written by hand and generated systems of 2 500 nodes. Checking a file of a
+megabyte takes at most about 2 seconds of processor time, whatever it contains, and 200 MB.
 """
 
 from __future__ import annotations
@@ -21,8 +21,11 @@ MAX_DEPTH = 32
 #: Keys, values, maps and lists in a file, counting values repeated by aliases again.
 MAX_VALUES = 200_000
 
-#: Entries of a section of a system, such as its nodes, and of the systems that it includes. Also
-#: entries of a section of a node, such as its parameters.
+#: Nodes of a system and of the systems that it includes.
+MAX_NODES = 2_500
+
+#: Entries of another section of a system and of the systems that it includes, and of a section of
+#: a node, such as its parameters.
 MAX_ENTRIES = 5_000
 
 #: Errors of one stage of checking a file.
@@ -41,7 +44,7 @@ MAX_INCLUDES = 5_000
 MAX_INCLUDED_VALUES = 200_000
 
 #: Keys and values that the nodes of a system declare; each node counts its node type again.
-MAX_DECLARED_VALUES = 400_000
+MAX_DECLARED_VALUES = 300_000
 
 #: Sections of parameter files that nodes get; a program gets the sections of all its files.
 MAX_PASSED_SECTIONS = 1_000_000

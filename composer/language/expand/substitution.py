@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import field
 from operator import is_
 
@@ -78,6 +78,27 @@ def references(tree: Tree) -> Iterator[str]:
                 yield from references(entry.value)
 
 
+def _values_without_references(tree: Tree) -> int:
+    """Return the number of keys and values in ``tree``; 0 if one of its texts has a reference."""
+    match tree:
+        case Scalar(value=value):
+            return 0 if isinstance(value, str) and _MARK in value else 1
+        case Sequence(items=items):
+            parts: Iterable[Tree] = items
+        case Mapping(entries=entries):
+            parts = [part for entry in entries for part in (entry.key, entry.value)]
+    total = 1
+    for part in parts:
+        if isinstance(part, Scalar):  # most parts are: these need no call
+            values = 0 if isinstance(part.value, str) and _MARK in part.value else 1
+        else:
+            values = _values_without_references(part)
+        if not values:
+            return 0
+        total += values
+    return total
+
+
 @dataclass(slots=True)
 class Growth:
     """The size of an expanded file."""
@@ -107,7 +128,7 @@ class Substitution:
         Values keep the location where they were written. Raises Stopped.
         """
         self.growth.values = self.growth.height = 0
-        made = self.add(tree, 0)
+        made = self._made(tree, 0)
         return Sized(made, self.growth.values, self.growth.height)
 
     def grow(self, values: int, tree: Tree) -> None:
@@ -129,13 +150,20 @@ class Substitution:
 
         Adds to the counts. A tree without variables is returned as it is. Raises Stopped.
         """
+        values = _values_without_references(tree)
+        if values:
+            self.grow(values, tree)
+            return tree
+        return self._made(tree, depth)
+
+    def _made(self, tree: Tree, depth: int) -> Tree:
         match tree:
             case Scalar():
                 return self._scalar(tree, depth)
             case Sequence(items=items):
                 self.grow(1, tree)
                 self.growth.height = max(self.growth.height, depth + 1)
-                made = tuple([self.add(item, depth + 1) for item in items])
+                made = tuple([self._made(item, depth + 1) for item in items])
                 return tree if all(map(is_, made, items)) else Sequence(made, tree.span)
             case Mapping():
                 return self._mapping(tree, depth)
@@ -143,7 +171,7 @@ class Substitution:
     def _mapping(self, tree: Mapping, depth: int) -> Mapping:
         self.grow(1 + len(tree.entries), tree)
         self.growth.height = max(self.growth.height, depth + 1)
-        values = [self.add(entry.value, depth + 1) for entry in tree.entries]
+        values = [self._made(entry.value, depth + 1) for entry in tree.entries]
         keys = [self.key(entry.key) for entry in tree.entries]
         made = tuple(
             [
@@ -160,7 +188,7 @@ class Substitution:
         """Return a key with its variables replaced, at its location. Raises Stopped."""
         if not isinstance(key.value, str) or not has_reference(key.value):
             return key
-        name = self.add(key, _KEY_DEPTH)
+        name = self._made(key, _KEY_DEPTH)
         if not isinstance(name, Scalar):
             message = f"'{shown(key.value)}' is {describe(name)}, which cannot be a name"
             self.diagnostics.append(Diagnostic(rules.MALFORMED_VARIABLE, message, key.span))

@@ -201,8 +201,8 @@ def test_what_a_file_cannot_hold_is_left_out(
 
 @pytest.mark.slow
 def test_nodes_that_a_file_cannot_hold_are_left_out() -> None:
-    nodes = tuple(FoundNode(f"n{number}", keys={"external": True}) for number in range(6_000))
+    nodes = tuple(FoundNode(f"n{number}", keys={"external": True}) for number in range(3_000))
     found = readable(FoundSystem("large", nodes))
-    assert len(found.nodes) == 5_000
-    assert found.left_out[0] == "node /n5000: the file is full"
+    assert len(found.nodes) == 2_500
+    assert found.left_out[0] == "node /n2500: the file is full"
     assert write_system(found).count("the file is full") == 200
