@@ -80,19 +80,19 @@ def references(tree: Tree) -> Iterator[str]:
 
 def _values_without_references(tree: Tree) -> int:
     """Return the number of keys and values in ``tree``; 0 if one of its texts has a reference."""
-    match tree:
-        case Scalar(value=value):
-            return 0 if isinstance(value, str) and _MARK in value else 1
-        case Sequence(items=items):
-            parts: Iterable[Tree] = items
-        case Mapping(entries=entries):
-            parts = [part for entry in entries for part in (entry.key, entry.value)]
     total = 1
+    match tree:
+        case Mapping(entries=entries):
+            parts: Iterable[Tree] = [part for item in entries for part in (item.key, item.value)]
+        case Sequence(items=items):
+            parts = items
+        case Scalar():
+            total, parts = 0, (tree,)
     for part in parts:
-        if isinstance(part, Scalar):  # most parts are: these need no call
-            values = 0 if isinstance(part.value, str) and _MARK in part.value else 1
-        else:
+        if not isinstance(part, Scalar):
             values = _values_without_references(part)
+        else:  # most parts: these need no call
+            values = 0 if isinstance(part.value, str) and _MARK in part.value else 1
         if not values:
             return 0
         total += values
