@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import field
 from operator import is_
 
@@ -21,7 +21,7 @@ from composer.language.document.limits import (
 )
 from composer.language.expand.scope import Scope, Sized
 from composer.language.rules import DUPLICATE_KEY, TOO_LARGE
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
+from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, count_values, describe
 
 _MARK = "${"
 _PIECE = re.compile(
@@ -78,25 +78,15 @@ def references(tree: Tree) -> Iterator[str]:
                 yield from references(entry.value)
 
 
-def _values_without_references(tree: Tree) -> int:
-    """Return the number of keys and values in ``tree``; 0 if one of its texts has a reference."""
-    total = 1
+def _refers(tree: Tree) -> bool:
+    """Return whether a text of ``tree`` contains a reference or an escape."""
     match tree:
-        case Mapping(entries=entries):
-            parts: Iterable[Tree] = [part for item in entries for part in (item.key, item.value)]
+        case Scalar(value=value):
+            return isinstance(value, str) and has_reference(value)
         case Sequence(items=items):
-            parts = items
-        case Scalar():
-            total, parts = 0, (tree,)
-    for part in parts:
-        if not isinstance(part, Scalar):
-            values = _values_without_references(part)
-        else:  # most parts: these need no call
-            values = 0 if isinstance(part.value, str) and _MARK in part.value else 1
-        if not values:
-            return 0
-        total += values
-    return total
+            return any(map(_refers, items))
+        case Mapping(entries=entries):
+            return any(has_reference(item.name) or _refers(item.value) for item in entries)
 
 
 @dataclass(slots=True)
@@ -150,13 +140,13 @@ class Substitution:
 
         Adds to the counts. A tree without variables is returned as it is. Raises Stopped.
         """
-        values = _values_without_references(tree)
-        if values:
-            self.grow(values, tree)
-            return tree
-        return self._made(tree, depth)
+        if _refers(tree):
+            return self._made(tree, depth)
+        self.grow(count_values(tree), tree)
+        return tree
 
     def _made(self, tree: Tree, depth: int) -> Tree:
+        """Work as :meth:`add`, and measure the height."""
         match tree:
             case Scalar():
                 return self._scalar(tree, depth)
