@@ -59,7 +59,7 @@ def system_of(text: str, folder: Path) -> System:
     return system
 
 
-def test_command(tmp_path: Path) -> None:
+def test_the_command_of_a_node(tmp_path: Path) -> None:
     program = tmp_path / "driver.sh"
     program.write_text("#!/bin/sh\n", encoding="utf-8")
     program.chmod(0o755)
@@ -75,6 +75,22 @@ def test_command(tmp_path: Path) -> None:
     assert command.environment["DEVICE"] == "/dev/ttyUSB0"
     assert command.environment["RATE"] == "10"
     assert command.environment["PATH"] == f"{Path(sys.executable).parent}:/usr/bin"
+    parts = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+    assert list(remappings(node)) == [
+        "joints:=/joints",
+        "~/status:=/status",
+        "move:=/move_arm",
+        *(f"move/_action/{part}:=/move_arm/_action/{part}" for part in parts),
+        "unlisted:=/listed",
+    ]
+    assert parameter_file(node) == dedent("""\
+        "/robot/left/driver":
+          ros__parameters:
+            "rate": 10.0
+            "name": "007: no"
+            "gains": [1.0, 2.5]
+            "enabled": true
+        """)
 
 
 @pytest.mark.parametrize(
@@ -95,30 +111,6 @@ def test_names_that_the_system_gives_to_a_program(
     assert node.executable is not None
     words = make_command(node, node.executable, LogLevel.WARN, {"PATH": "/bin:/usr/bin"}).words
     assert [word for word in words if word.startswith("__")] == names
-
-
-def test_remappings(tmp_path: Path) -> None:
-    node = system_of(SYSTEM, tmp_path).nodes[0]
-    parts = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
-    assert list(remappings(node)) == [
-        "joints:=/joints",
-        "~/status:=/status",
-        "move:=/move_arm",
-        *(f"move/_action/{part}:=/move_arm/_action/{part}" for part in parts),
-        "unlisted:=/listed",
-    ]
-
-
-def test_parameter_file(tmp_path: Path) -> None:
-    node = system_of(SYSTEM, tmp_path).nodes[0]
-    assert parameter_file(node) == dedent("""\
-        "/robot/left/driver":
-          ros__parameters:
-            "rate": 10.0
-            "name": "007: no"
-            "gains": [1.0, 2.5]
-            "enabled": true
-        """)
 
 
 @pytest.mark.parametrize(

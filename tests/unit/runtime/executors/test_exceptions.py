@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -111,47 +110,35 @@ def test_a_huge_text_is_cut() -> None:
     assert len(report_of(error)) < 25_000
 
 
-def test_the_text_of_an_exception_without_text_is_its_type() -> None:
-    assert text_of(CallError("no server")) == "no server"
-    assert text_of(CallError()) == "CallError"
-    assert text_of(TextRaises()) == f"TextRaises: {FAILED}"
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (text_of(CallError("no server")), "no server"),
+        (text_of(CallError()), "CallError"),
+        (text_of(TextRaises()), f"TextRaises: {FAILED}"),
+        (shown([1, 2]), "[1, 2]"),
+        (shown(ReprRaises()), "a ReprRaises whose __repr__ failed"),
+        (f"{len(shown('x' * 10_000))}", "80"),
+        (printable("Grüße"), "Grüße"),
+        (printable("\udc80"), "\\udc80"),
+        (printable(Text("a")), "a"),
+        (printable(3), "3"),
+    ],
+)
+def test_texts_of_exceptions_and_values(found: str, expected: str) -> None:
+    assert found == expected
+    assert type(found) is str
 
 
 def test_a_report_has_the_frames_of_user_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
-    error = raised_within(lambda: printable(TextRaises()))
-    assert 'test_exceptions.py", line' in report_of(error)
-    assert "executors/exceptions.py" not in report_of(error)
-    monkeypatch.setenv("COMPOSE_DEBUG", "1")
-    assert "executors/exceptions.py" in report_of(error)
-
-
-def test_a_report_has_no_traceback_without_frames_of_user_code(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
+    with pytest.raises(ValueError, match="no text") as caught:
+        printable(TextRaises())
+    assert 'test_exceptions.py", line' in report_of(caught.value)
+    assert "executors/exceptions.py" not in report_of(caught.value)
     assert report_of(ValueError("never raised")) == "ValueError: never raised"
-
-
-def raised_within(function: Callable[[], object]) -> BaseException:
-    try:
-        function()
-    except BaseException as error:
-        return error
-    raise AssertionError
-
-
-def test_wrong_values_are_shown_whatever_they_are() -> None:
-    assert shown([1, 2]) == "[1, 2]"
-    assert len(shown("x" * 10_000)) == 80
-    assert shown(ReprRaises()) == "a ReprRaises whose __repr__ failed"
-
-
-def test_texts_are_printable() -> None:
-    assert printable("Grüße") == "Grüße"
-    assert printable("\udc80") == "\\udc80"
-    assert type(printable(Text("a"))) is str
-    assert printable(3) == "3"
+    monkeypatch.setenv("COMPOSE_DEBUG", "1")
+    assert "executors/exceptions.py" in report_of(caught.value)
 
 
 def test_closing_differs_from_a_generator_exit_of_user_code() -> None:

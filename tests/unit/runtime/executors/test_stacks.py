@@ -36,7 +36,9 @@ def waiting() -> Iterator[int]:
 
 
 def test_the_innermost_frame_is_first_and_shown_last(waiting: int) -> None:
-    stack = stacks_of((waiting,))[waiting]
+    stacks = stacks_of((0, waiting))
+    assert list(stacks) == [waiting], "a thread that has ended is left out"
+    stack = stacks[waiting]
     names = [frame.f_code.co_name for frame in stack]
     assert "wait_here" in names
     assert names[-1] == "_bootstrap"
@@ -58,10 +60,6 @@ def test_user_frames_are_those_within_the_composer(waiting: int) -> None:
 
     describe(Raised())
     assert found == ["__str__"]
-
-
-def test_threads_that_have_ended_are_left_out(waiting: int) -> None:
-    assert list(stacks_of((0, waiting))) == [waiting]
 
 
 @pytest.mark.parametrize("collects", [True, False])
