@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from dataclasses import replace
 from random import Random
-from typing import Any
 
 import pytest
 
@@ -52,16 +51,13 @@ def test_a_percentile_is_right_within_a_tenth(scale_s: float) -> None:
     assert durations.longest_s == times_s[-1]
 
 
-def test_values_beyond_the_scale_are_counted() -> None:
+def test_an_empty_histogram_is_zero_and_values_beyond_the_scale_are_counted() -> None:
+    durations = counted()
+    assert (durations.count, durations.mean_s, durations.percentile_s(0.99)) == (0, 0.0, 0.0)
     durations = counted(0.0, 1e-9, 5000.0)
     assert durations.count == 3
     assert durations.percentile_s(1.0) == durations.longest_s == 5000.0
     assert durations.percentile_s(0.5) <= 1e-7
-
-
-def test_an_empty_histogram_is_zero() -> None:
-    durations = counted()
-    assert (durations.count, durations.mean_s, durations.percentile_s(0.99)) == (0, 0.0, 0.0)
 
 
 def test_a_duration_can_have_a_weight() -> None:
@@ -129,15 +125,8 @@ def test_the_rate_of_a_slow_callback_does_not_change_from_report_to_report() -> 
 
 
 def report(at_s: float, *callbacks: CallbackFigures) -> SystemReport:
-    return SystemReport(
-        name="/robot",
-        activity="running",
-        host="robot1",
-        pid="12",
-        nodes=(),
-        callbacks=callbacks,
-        callbacks_at_s=at_s,
-    )
+    timed = {"callbacks": callbacks, "callbacks_at_s": at_s}
+    return SystemReport("/robot", "running", (), "robot1", "12", **timed)  # type: ignore[arg-type]
 
 
 def two_reports() -> tuple[SystemReport, SystemReport]:
@@ -196,6 +185,10 @@ def test_the_summary_shows_the_slowest_callbacks() -> None:
     assert lines[2] == "1 more callbacks took less time"
 
 
+def node(name: str, process: str) -> NodeReport:
+    return NodeReport(name, "active", state="active", process=process)
+
+
 def whole(at_s: float, others_at_s: float, calls: int) -> SystemReport:
     """Return a report with the callbacks of another process, which has reported at its own time."""
     other = replace(
@@ -231,13 +224,3 @@ def test_a_process_has_rates_once_two_of_its_reports_are_apart() -> None:
         found = {item.figures.node: item.calls_hz for item in meter.read(now)}
         assert meter.rated_s(now)["acting"] == rated_s
         assert (found.get("/b") is None) == (rated_s is None)
-
-
-def node(name: str, process: str) -> NodeReport:
-    zeros = dict.fromkeys(("since_s", "restarts", "errors", "sent_hz", "received_hz", "busy"), 0)
-    counts = {"overruns": 0, "queue_drops": 0, "qos_events": {}, "depends_on": {}}
-    topics = {"sent": {}, "received": {}, "dropped": {}}
-    texts = dict.fromkeys(("last_error", "held_down", "condition", "slowest"), "")
-    texts["process"] = process
-    values: dict[str, Any] = {**zeros, **counts, **topics, **texts}
-    return NodeReport(node=name, state="active", desired="active", **values)

@@ -109,21 +109,17 @@ def test_a_command_adopts_the_discovery_of_running_systems(running: ExitStack) -
     environment: dict[str, str] = {}
     assert adopt_discovery(environment) is None
     assert environment == {}
-    running.enter_context(hold_instance_lock("/robot", SERVER))
+    running.enter_context(hold_instance_lock("/robot", {**SERVER, "LD_PRELOAD": "/evil.so"}))
     running.enter_context(hold_instance_lock("/robot/acting", SERVER))
     assert adopt_discovery(environment) is None
-    assert environment == SERVER
+    assert environment == SERVER, "and no other variable"
+    environment = {"ROS_STATIC_PEERS": "10.0.0.7"}
+    assert adopt_discovery(environment) is None
+    assert environment == {"ROS_STATIC_PEERS": "10.0.0.7"}, "the user has set it"
     running.close()
     environment.clear()
     adopt_discovery(environment)
     assert environment == {}
-
-
-def test_a_command_keeps_what_the_user_has_set(running: ExitStack) -> None:
-    running.enter_context(hold_instance_lock("/robot", SERVER))
-    environment = {"ROS_STATIC_PEERS": "10.0.0.7"}
-    assert adopt_discovery(environment) is None
-    assert environment == {"ROS_STATIC_PEERS": "10.0.0.7"}
 
 
 def test_a_command_adopts_nothing_if_systems_differ(running: ExitStack) -> None:
@@ -134,13 +130,6 @@ def test_a_command_adopts_nothing_if_systems_differ(running: ExitStack) -> None:
     assert environment == {}
     assert warning is not None
     assert "/lab: multicast; /robot: ROS_DISCOVERY_SERVER=10.0.0.1:11811" in warning
-
-
-def test_only_variables_of_discovery_are_adopted(running: ExitStack) -> None:
-    running.enter_context(hold_instance_lock("/robot", {**SERVER, "LD_PRELOAD": "/evil.so"}))
-    environment: dict[str, str] = {}
-    adopt_discovery(environment)
-    assert environment == SERVER
 
 
 def settings_of(path: str) -> list[tuple[str, str]]:
@@ -167,11 +156,14 @@ def test_interfaces_are_limited_by_a_profile_that_processes_share(tmp_path: Path
     assert environment[PROFILES] == path
 
 
-def test_large_messages_keep_the_interfaces(tmp_path: Path) -> None:
+def test_the_profile_for_large_messages_keeps_interfaces_and_has_peers(tmp_path: Path) -> None:
     environment: dict[str, str] = {}
     use_discovery_profile(environment, tmp_path)
-    use_interfaces(discovery("multicast", interfaces=texts("lo")), environment)
     enlarged = tmp_path / "enlarged.xml"
+    enlarged.write_bytes(profile_with_segment(environment[PROFILES], ["10.0.0.7", "jetson"]))
+    addresses = [text for name, text in settings_of(str(enlarged)) if name == "address"]
+    assert addresses == ["127.0.0.1", "10.0.0.7", "jetson"]
+    use_interfaces(discovery("multicast", interfaces=texts("lo")), environment)
     enlarged.write_bytes(profile_with_segment(environment[PROFILES], None))
     settings = settings_of(str(enlarged))
     assert ("interface", "lo") in settings
@@ -202,15 +194,6 @@ def test_interfaces_give_way_to_the_environment(configured: dict[str, str], tmp_
     (warning,) = use_interfaces(discovery("multicast", interfaces=texts("lo")), environment)
     assert "'interfaces' of the system are not used" in warning
     assert environment == before
-
-
-def test_peers_are_part_of_the_profile_for_large_messages(tmp_path: Path) -> None:
-    environment: dict[str, str] = {}
-    use_discovery_profile(environment, tmp_path)
-    enlarged = tmp_path / "enlarged.xml"
-    enlarged.write_bytes(profile_with_segment(environment[PROFILES], ["10.0.0.7", "jetson"]))
-    addresses = [text for name, text in settings_of(str(enlarged)) if name == "address"]
-    assert addresses == ["127.0.0.1", "10.0.0.7", "jetson"]
 
 
 def test_the_state_of_a_port() -> None:

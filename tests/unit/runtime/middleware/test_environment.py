@@ -41,19 +41,16 @@ def test_a_valid_environment_is_accepted(environment: dict[str, str]) -> None:
 @pytest.mark.parametrize(
     ("environment", "message", "hint"),
     [
-        ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID is '-1'", "from 0 to 232"),
-        ({"ROS_DOMAIN_ID": "x"}, "ROS_DOMAIN_ID is 'x'", "from 0 to 232"),
-        ({"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID is '233'", "from 0 to 232"),
-        ({"ROS_DOMAIN_ID": "\N{SUPERSCRIPT TWO}"}, "is not a domain id", "from 0 to 232"),
-        (
-            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOTS"},
-            "is not a discovery range",
-            "did you mean LOCALHOST?",
+        *(
+            ({"ROS_DOMAIN_ID": text}, f"ROS_DOMAIN_ID is '{text}'", "from 0 to 232")
+            for text in ("-1", "x", "233", "\N{SUPERSCRIPT TWO}")
         ),
-        (
-            {"ROS_AUTOMATIC_DISCOVERY_RANGE": "BOGUS"},
-            "is not a discovery range",
-            "valid values: SUBNET",
+        *(
+            ({"ROS_AUTOMATIC_DISCOVERY_RANGE": text}, "is not a discovery range", hint)
+            for text, hint in (
+                ("LOCALHOTS", "did you mean LOCALHOST?"),
+                ("BOGUS", "valid values: SUBNET"),
+            )
         ),
         ({"ROS_SECURITY_ENABLE": "true"}, "ROS_SECURITY_KEYSTORE is not set", "create_keystore"),
         *(
@@ -99,11 +96,8 @@ def test_a_middleware_that_is_not_installed_is_refused(tmp_path: Path) -> None:
 
 
 def test_variables_that_are_set_are_kept() -> None:
-    given = {
-        "AMENT_PREFIX_PATH": "/opt/ros/jazzy",
-        "RCUTILS_CONSOLE_OUTPUT_FORMAT": "x",
-        "ROS_DISTRO": "kilted",
-    }
+    given = {"AMENT_PREFIX_PATH": "/opt/ros/jazzy", "ROS_DISTRO": "kilted"}
+    given |= {"RCUTILS_CONSOLE_OUTPUT_FORMAT": "x"}
     environment = dict(given)
     complete_environment(environment)
     assert environment == given | {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}

@@ -34,6 +34,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_held_lock_refuses_a_second_process_and_is_listed(folder: Path) -> None:
+    assert not is_held(NAME)
+    assert list(folder.iterdir()) == [], "looking for a lock creates no file"
     with hold_instance_lock(NAME):
         assert local_systems() == {NAME: str(os.getpid())}
         with pytest.raises(StartRefused, match="already runs"), hold_instance_lock(NAME):
@@ -60,11 +62,6 @@ def test_a_start_waits_for_a_process_that_only_looks(
         monkeypatch.setattr(COMPUTER, "sleep", sleep)
         with hold_instance_lock(NAME):
             assert is_held(NAME)
-
-
-def test_looking_for_a_lock_that_was_never_held_creates_no_file(folder: Path) -> None:
-    assert not is_held(NAME)
-    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("session", ["/run/user/1000", ""])
@@ -95,14 +92,33 @@ def test_old_lock_files_stay_while_a_system_runs(folder: Path, tmp_path: Path) -
     assert not folder.exists()
 
 
-def test_a_symbolic_link_in_place_of_the_folder_is_refused(folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *("symbolic link", "writable"),
+        pytest.param(
+            "of another user",
+            marks=pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away"),
+        ),
+    ],
+)
+def test_a_folder_that_others_can_write_to_is_refused(
+    kind: str, folder: Path, tmp_path: Path
+) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir(mode=0o700)
-    folder.symlink_to(elsewhere)
+    if kind == "symbolic link":
+        folder.symlink_to(elsewhere)
+    else:
+        elsewhere.rename(folder)
+    if kind == "writable":
+        folder.chmod(0o777)
+    if kind == "of another user":
+        os.chown(folder, OTHER_USER, OTHER_USER)
     with pytest.raises(StartRefused, match="other users can write"), hold_instance_lock(NAME):
         pass
     assert local_systems() == {}
-    assert list(elsewhere.iterdir()) == []
+    assert list(folder.iterdir()) == []
 
 
 def test_a_symbolic_link_in_place_of_a_lock_file_is_not_followed(
@@ -115,19 +131,3 @@ def test_a_symbolic_link_in_place_of_a_lock_file_is_not_followed(
     with hold_instance_lock(NAME):
         pass
     assert valuable.read_text() == "data"
-
-
-def test_a_folder_that_others_can_write_to_is_refused(folder: Path) -> None:
-    folder.mkdir()
-    folder.chmod(0o777)
-    with pytest.raises(StartRefused, match="other users can write"), hold_instance_lock(NAME):
-        pass
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
-def test_a_folder_of_another_user_is_refused(folder: Path) -> None:
-    folder.mkdir(mode=0o700)
-    os.chown(folder, OTHER_USER, OTHER_USER)
-    with pytest.raises(StartRefused, match="other users can write"):
-        hold_instance_lock(NAME).__enter__()
-    assert list(folder.iterdir()) == []

@@ -33,10 +33,6 @@ VIEW: GraphView = {
 LIMIT_S = 30.0
 
 
-def answer_of(view: GraphView | None) -> GraphAnswer | None:
-    return None if view is None else GraphAnswer(view)
-
-
 def read_graph(system: str, timeout_s: float) -> GraphView | None:
     answer = ask(system, GraphQuery(), timeout_s)
     return None if answer is None else answer.names
@@ -50,16 +46,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyP
     return path.parent
 
 
+Serve = Callable[[Callable[[], GraphView | None]], list[Exception]]
+
+
 @pytest.fixture
-def serve() -> Iterator[Callable[[Callable[[], GraphView | None]], list[Exception]]]:
+def serve() -> Iterator[Serve]:
     """Serve a view as the system /robot; return the list of errors."""
     sockets: list[QuerySocket] = []
 
     def start(view: Callable[[], GraphView | None]) -> list[Exception]:
+        def answer(_: object) -> GraphAnswer | None:
+            names = view()
+            return None if names is None else GraphAnswer(names)
+
         errors: list[Exception] = []
-        sockets.append(
-            QuerySocket("/robot", {GraphQuery: lambda _: answer_of(view())}, errors.append)
-        )
+        sockets.append(QuerySocket("/robot", {GraphQuery: answer}, errors.append))
         return errors
 
     yield start
@@ -67,24 +68,14 @@ def serve() -> Iterator[Callable[[Callable[[], GraphView | None]], list[Exceptio
         item.close(LIMIT_S)
 
 
-def test_a_view_arrives_unchanged(serve: Callable[..., list[Exception]]) -> None:
-    serve(lambda: VIEW)
-    assert read_graph("/robot", LIMIT_S) == VIEW
-    assert read_graph("/robot", LIMIT_S) == VIEW
-    assert read_graph("/other", LIMIT_S) is None
-
-
-def test_a_large_view_arrives(serve: Callable[..., list[Exception]]) -> None:
+def test_a_view_arrives_unchanged(serve: Serve) -> None:
     topics = tuple((f"/topic_{number}", ("std_msgs/msg/String",)) for number in range(20_000))
-    serve(lambda: {**VIEW, "topic": topics})
-    found = read_graph("/robot", LIMIT_S)
-    assert found is not None
-    assert found["topic"] == topics
-
-
-def test_an_incomplete_view_is_none(serve: Callable[..., list[Exception]]) -> None:
-    serve(lambda: None)
-    assert read_graph("/robot", LIMIT_S) is None
+    views: list[GraphView | None] = [None, {**VIEW, "topic": topics}, VIEW, VIEW]
+    served = iter(views)
+    serve(lambda: next(served))
+    assert [read_graph("/robot", LIMIT_S) for _ in views] == views
+    assert read_graph("/other", LIMIT_S) is None
+    assert visible_names(VIEW["node"]) == (("/a", ()),)
 
 
 def test_an_error_is_reported_and_the_next_command_served(
@@ -243,30 +234,17 @@ def test_a_command_that_sends_slowly_is_left_in_the_end(
         assert time.monotonic() < began_s + LIMIT_S
 
 
-def test_the_socket_of_a_killed_process_is_replaced(
-    folder: Path, serve: Callable[..., list[Exception]]
-) -> None:
+def test_the_socket_of_a_killed_process_is_replaced_and_none_is_left(folder: Path) -> None:
+    (folder / "left").touch()
     path = socket_path("/robot")
     assert path is not None
     path.touch()
     assert read_graph("/robot", LIMIT_S) is None
-    serve(lambda: VIEW)
+    too_long = "/" + "x" * 150
+    queries = {GraphQuery: lambda _: GraphAnswer(VIEW)}
+    servers = [QuerySocket(name, queries, lambda _: None) for name in ("/robot", too_long)]
     assert read_graph("/robot", LIMIT_S) == VIEW
-
-
-def test_no_file_is_left_at_the_end(folder: Path) -> None:
-    server = QuerySocket("/robot", {GraphQuery: lambda _: answer_of(VIEW)}, lambda _: None)
-    assert len(list(folder.iterdir())) == 1
-    server.close(LIMIT_S)
-    assert list(folder.iterdir()) == []
-
-
-def test_a_name_too_long_for_a_socket_is_accepted() -> None:
-    system = "/" + "x" * 150
-    server = QuerySocket(system, {GraphQuery: lambda _: answer_of(VIEW)}, lambda _: None)
-    assert read_graph(system, LIMIT_S) is None
-    server.close(LIMIT_S)
-
-
-def test_hidden_names_are_left_out() -> None:
-    assert visible_names(VIEW["node"]) == (("/a", ()),)
+    assert read_graph(too_long, LIMIT_S) is None
+    for server in servers:
+        server.close(LIMIT_S)
+    assert list(folder.iterdir()) == [folder / "left"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -35,43 +34,44 @@ def started(phase: Phase) -> list[tuple[int, tuple[int, ...]]]:
     return [(step.number, tuple(other.number for other in after)) for step, after in ready]
 
 
-def phase_of(waiting: deque[Step], processes: Mapping[str, str], *, down: bool = True) -> Phase:
-    return Phase(waiting, ExecutionOptions(best_effort=down), processes)
+ONE = [(1, ())]
 
 
-def test_a_process_gets_a_chain_of_its_nodes_at_once() -> None:
-    processes = {f"n{number}": "other" for number in range(1, 5)}
-    phase = phase_of(steps((), (1,), (2,), (1, 3)), processes)
-    assert started(phase) == [(1, ()), (2, (1,)), (3, (2,)), (4, (1, 3))]
-
-
-def test_a_step_waits_here_for_nodes_of_another_process() -> None:
-    processes = {"n1": "left", "n2": "right", "n3": "right"}
-    phase = phase_of(steps((), (1,), (2,)), processes)
-    assert started(phase) == [(1, ())]
-    phase.running.clear()
-    phase.done.add(1)
-    assert started(phase) == [(2, ()), (3, (2,))]
-
-
-def test_a_later_request_waits_for_a_step_of_an_earlier_one() -> None:
-    processes = {"n1": "left", "n2": "right", "n3": "left"}
-    phase = phase_of(steps((), (), (1, 2)), processes)
-    assert started(phase) == [(1, ()), (2, ())]
-    del phase.running[2]
-    phase.done.add(2)
-    assert started(phase) == [(3, (1,))]
-
-
-def test_nodes_of_this_process_wait_here() -> None:
-    phase = phase_of(steps((), (1,)), {})
-    assert started(phase) == [(1, ())]
-    assert started(phase) == []
-
-
-def test_all_or_nothing_plans_wait_here_for_each_success() -> None:
-    phase = phase_of(steps((), (1,)), {"n1": "other", "n2": "other"}, down=False)
-    assert started(phase) == [(1, ())]
+@pytest.mark.parametrize(
+    ("after", "processes", "best_effort", "first", "ended", "then"),
+    [
+        pytest.param(
+            *([(), (1,), (2,), (1, 3)], "oooo", True),
+            *([(1, ()), (2, (1,)), (3, (2,)), (4, (1, 3))], (), []),
+            id="a process gets a chain of its nodes at once",
+        ),
+        pytest.param(
+            *([(), (1,), (2,)], "lrr", True, ONE, (1,), [(2, ()), (3, (2,))]),
+            id="a step waits here for nodes of another process",
+        ),
+        pytest.param(
+            *([(), (), (1, 2)], "lrl", True, [(1, ()), (2, ())], (2,), [(3, (1,))]),
+            id="a later request waits for a step of an earlier one",
+        ),
+        pytest.param([(), (1,)], "", True, ONE, (), [], id="nodes of this process wait here"),
+        pytest.param([(), (1,)], "oo", False, ONE, (), [], id="all or nothing: each success"),
+    ],
+)
+def test_steps_are_started_as_soon_as_their_process_can_order_them(
+    after: list[tuple[int, ...]],
+    processes: str,
+    best_effort: bool,
+    first: list[tuple[int, tuple[int, ...]]],
+    ended: tuple[int, ...],
+    then: list[tuple[int, tuple[int, ...]]],
+) -> None:
+    of_nodes = {f"n{number}": process for number, process in enumerate(processes, start=1)}
+    phase = Phase(steps(*after), ExecutionOptions(best_effort=best_effort), of_nodes)
+    assert started(phase) == first
+    for number in ended:
+        del phase.running[number]
+        phase.done.add(number)
+    assert started(phase) == then
 
 
 class SuspendedQueue:
