@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from composer.model import PrimaryState, System
+from composer.model import System
 from composer.plan import DesiredState, Fault, FaultKind, Restart, desired_states, reconcile
+from tests.unit.support.plans import ACTIVE, INACTIVE, UNCONFIGURED
 from tests.unit.support.resolving import system_of
 
-ACTIVE, INACTIVE, UNCONFIGURED = (
-    PrimaryState.ACTIVE,
-    PrimaryState.INACTIVE,
-    PrimaryState.UNCONFIGURED,
-)
 ALL_ACTIVE = {"sensor": ACTIVE, "planner": ACTIVE, "motor": ACTIVE}
 
 
@@ -40,11 +36,8 @@ def test_an_external_transition_outdates_earlier_faults_of_the_node() -> None:
     assert moved.fail(noticed) == moved
     assert moved.fail(fault("sensor", moved.serial)).down == {"sensor": "silent"}
     assert moved.fail(fault("planner", desired.serial)).down == {"planner": "silent"}
-
-
-def test_a_node_that_hangs_fails_whatever_moved_it() -> None:
-    desired = DesiredState(ALL_ACTIVE).move("sensor", INACTIVE)
-    assert desired.fail(fault("sensor", 0, FaultKind.LOST)).down == {"sensor": "silent"}
+    hangs = fault("sensor", 0, FaultKind.LOST)
+    assert moved.fail(hangs).down == {"sensor": "silent"}, "whatever moved it"
 
 
 def test_goals_do_not_replace_those_of_later_external_transitions() -> None:

@@ -7,11 +7,8 @@ import pytest
 from composer.model import PrimaryState
 from composer.model.dependencies import dependency_cycles, dependency_edges, in_dependency_order
 from composer.plan import Plan, bring_up, tear_down
+from tests.unit.support.plans import steps
 from tests.unit.support.resolving import system_of
-
-
-def steps(plan: Plan) -> list[str]:
-    return [f"{step.transition} {step.node}" for step in plan.steps]
 
 
 def causes(plan: Plan) -> dict[str, str]:
@@ -39,24 +36,7 @@ def test_autostart_says_how_far(own: str, given: PrimaryState | None, expected: 
     assert steps(bring_up(system, given)) == expected
 
 
-def test_a_node_goes_no_further_than_its_own_autostart() -> None:
-    system = system_of(
-        system_with(
-            "late: {lifecycle: {autostart: unconfigured}}",
-            "waiting: {lifecycle: {autostart: inactive}}",
-            "eager: {lifecycle: {autostart: active}}",
-        )
-    )
-    plan = bring_up(system)
-    assert steps(plan) == ["configure waiting", "configure eager", "activate eager"]
-    assert causes(plan)["waiting"] == "its own autostart is inactive"
-    assert steps(bring_up(system, PrimaryState.INACTIVE)) == [
-        "configure waiting",
-        "configure eager",
-    ]
-
-
-def test_a_node_goes_no_further_than_what_it_depends_on_lets_it() -> None:
+def test_a_node_goes_no_further_than_its_own_autostart_and_what_it_depends_on() -> None:
     system = system_of(
         system_with(
             "needs_active: {lifecycle: {depends_on: [waiting]}}",
@@ -64,14 +44,16 @@ def test_a_node_goes_no_further_than_what_it_depends_on_lets_it() -> None:
             "needs_late: {lifecycle: {depends_on: [late]}}",
             "waiting: {lifecycle: {autostart: inactive}}",
             "late: {lifecycle: {autostart: unconfigured}}",
+            "alone: {lifecycle: {autostart: inactive}}",
+            "eager: {lifecycle: {autostart: active}}",
         )
     )
-    assert steps(bring_up(system)) == [
-        "configure waiting",
-        "configure needs_active",
-        "configure needs_inactive",
-        "activate needs_inactive",
-    ]
+    plan = bring_up(system)
+    names = ("waiting", "needs_active", "needs_inactive", "alone", "eager")
+    configured = [f"configure {name}" for name in names]
+    assert steps(plan) == [*configured, "activate needs_inactive", "activate eager"]
+    assert causes(plan)["alone"] == "its own autostart is inactive"
+    assert steps(bring_up(system, PrimaryState.INACTIVE)) == configured
 
 
 SERVING = (
@@ -81,18 +63,14 @@ SERVING = (
 )
 
 
-def test_servers_start_before_their_clients() -> None:
-    system = system_of(system_with(*SERVING))
-    plan = bring_up(system)
+def test_servers_start_before_their_clients_unless_they_depend_on_them() -> None:
+    plan = bring_up(system_of(system_with(*SERVING)))
     assert steps(plan)[:3] == ["configure server", "configure client", "configure goer"]
     cause = "goer and client call it, and servers start before their clients"
     assert causes(plan)["server"] == cause
-
-
-def test_declared_dependencies_override_the_wiring() -> None:
     server = SERVING[2].removesuffix("}") + ", lifecycle: {depends_on: [client]}}"
-    system = system_of(system_with(SERVING[0], SERVING[1], server))
-    assert steps(bring_up(system))[:3] == ["configure client", "configure server", "configure goer"]
+    plan = bring_up(system_of(system_with(SERVING[0], SERVING[1], server)))
+    assert steps(plan)[:3] == ["configure client", "configure server", "configure goer"]
 
 
 def test_nodes_that_serve_each_other_keep_the_order_they_are_declared_in() -> None:

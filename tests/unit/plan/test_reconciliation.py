@@ -4,72 +4,32 @@ from __future__ import annotations
 
 import pytest
 
-from composer.model import OnFailure, PrimaryState, System
-from composer.plan import (
-    Decision,
-    DesiredState,
-    Fault,
-    FaultKind,
-    decide,
-    desired_states,
-    reconcile,
-)
+from composer.model import OnFailure, PrimaryState
+from composer.plan import Decision, DesiredState, decide, desired_states, reconcile
+from tests.unit.support.plans import fault, robot, states, steps
 from tests.unit.support.resolving import system_of
 
-ACTIVE = PrimaryState.ACTIVE
-LETTERS = {"u": PrimaryState.UNCONFIGURED, "i": PrimaryState.INACTIVE, "a": ACTIVE}
 NOW_S = 100.0
-NAMES = ("sensor", "planner", "motor", "logger", "camera")
-
-
-SHUTTING_DOWN = "shutting down the system"
-
-
-def robot(
-    lifecycle: str = "{on_failure: restart}", sensor: str = "{}", camera: str = "{}"
-) -> System:
-    return system_of(
-        f"""
-        system: robot
-        lifecycle: {lifecycle}
-        nodes:
-          logger: {{lifecycle: {{depends_on: {{planner: inactive}}}}}}
-          motor: {{lifecycle: {{depends_on: [planner]}}}}
-          planner: {{lifecycle: {{depends_on: [sensor]}}}}
-          sensor: {sensor}
-          camera: {camera}
-        """
-    )
-
-
-def states(letters: str) -> dict[str, PrimaryState]:
-    return {name: LETTERS[letter] for name, letter in zip(NAMES, letters, strict=True)}
-
-
-def fault(node: str, kind: FaultKind = FaultKind.SILENCE) -> Fault:
-    return Fault(node, kind, "silent for 300 ms", serial=0)
 
 
 @pytest.mark.parametrize(
-    ("down", "goals"),
+    ("goals", "down", "wanted"),
     [
-        ((), "aaaaa"),
-        (("sensor",), "uiiaa"),  # the logger can do with an inactive planner
-        (("planner",), "auiia"),
-        (("motor",), "aauaa"),
-        (("camera",), "aaaau"),
-        (("sensor", "camera"), "uiiau"),
-        (("planner", "sensor"), "uuiia"),
+        ("aaaaa", (), "aaaaa"),
+        ("aaaaa", ("sensor",), "uiiaa"),  # the logger can do with an inactive planner
+        ("aaaaa", ("planner",), "auiia"),
+        ("aaaaa", ("motor",), "aauaa"),
+        ("aaaaa", ("camera",), "aaaau"),
+        ("aaaaa", ("sensor", "camera"), "uiiau"),
+        ("aaaaa", ("planner", "sensor"), "uuiia"),
+        ("aiuii", ("sensor",), "uiuii"),  # a fault raises the desired state of no other node
     ],
 )
-def test_where_nodes_are_wanted_while_some_are_held_down(down: tuple[str, ...], goals: str) -> None:
-    desired = DesiredState(states("aaaaa"), dict.fromkeys(down, "silent"))
-    assert desired_states(robot(), desired) == states(goals)
-
-
-def test_a_fault_raises_the_desired_state_of_no_other_node() -> None:
-    desired = DesiredState(states("aiuii"), {"sensor": "silent"})
-    assert desired_states(robot(), desired) == states("uiuii")
+def test_where_nodes_are_wanted_while_some_are_held_down(
+    goals: str, down: tuple[str, ...], wanted: str
+) -> None:
+    desired = DesiredState(states(goals), dict.fromkeys(down, "silent"))
+    assert desired_states(robot(), desired) == states(wanted)
 
 
 DOWN = [
@@ -102,32 +62,23 @@ def test_dependents_pause_before_a_restart_and_resume_behind_it() -> None:
 
 
 def test_a_node_that_a_user_deactivated_stays_inactive() -> None:
-    system = robot()
-    desired = (
-        DesiredState(states("aaaaa"))
-        .with_goals({"motor": PrimaryState.INACTIVE})
-        .fail(fault("sensor"))
-    )
+    system, goals = robot(), {"motor": PrimaryState.INACTIVE}
+    desired = DesiredState(states("aaaaa")).with_goals(goals).fail(fault("sensor"))
     down = reconcile(system, desired, states("aaiaa"), "")
-    assert [step.node for step in down.steps] == ["planner", "sensor", "sensor"]
+    assert steps(down) == ["deactivate planner", "deactivate sensor", "cleanup sensor"]
     up = reconcile(system, desired.restart("sensor", 100.5), states("uiiaa"), "restart")
-    assert [step.node for step in up.steps] == ["sensor", "sensor", "planner"]
+    assert steps(up) == ["configure sensor", "activate sensor", "activate planner"]
 
 
 def test_no_node_is_activated_before_a_dependency_that_a_user_deactivated() -> None:
-    system = robot()
-    desired = DesiredState(states("aiaaa"))
+    system, desired = robot(), DesiredState(states("aiaaa"))
     assert reconcile(system, desired, states("aiaaa"), "").steps == (), "no node is taken down"
     plan = reconcile(system, desired, states("aiuua"), "")
-    assert [f"{step.transition} {step.node}" for step in plan.steps] == [
-        "configure logger",
-        "configure motor",
-        "activate logger",
-    ]
+    assert steps(plan) == ["configure logger", "configure motor", "activate logger"]
 
 
 @pytest.mark.parametrize(
-    ("here", "goal", "steps"),
+    ("here", "goal", "expected"),
     [
         ("ui", "aa", []),
         ("uu", "aa", []),
@@ -137,7 +88,7 @@ def test_no_node_is_activated_before_a_dependency_that_a_user_deactivated() -> N
     ],
 )
 def test_a_class_is_not_configured_before_what_it_depends_on(
-    here: str, goal: str, steps: list[str]
+    here: str, goal: str, expected: list[str]
 ) -> None:
     system = system_of(
         """
@@ -147,19 +98,15 @@ def test_a_class_is_not_configured_before_what_it_depends_on(
           viewer: {class: "viewer:Viewer", lifecycle: {depends_on: [sensor]}}
         """
     )
-    at, goals = (
-        {name: LETTERS[letter] for name, letter in zip(("sensor", "viewer"), text, strict=True)}
-        for text in (here, goal)
-    )
+    at, goals = (states(letters, ("sensor", "viewer")) for letters in (here, goal))
     desired = DesiredState(goals)
     if at["sensor"] is PrimaryState.UNCONFIGURED:
         desired = desired.fail(fault("sensor"))
-    plan = reconcile(system, desired, at, "")
-    assert [f"{step.transition} {step.node}" for step in plan.steps] == steps
+    assert steps(reconcile(system, desired, at, "")) == expected
 
 
 @pytest.mark.parametrize(
-    ("here", "goal", "down", "steps"),
+    ("here", "goal", "down", "expected"),
     [
         (
             *("uuu", "aaa", ""),
@@ -172,15 +119,11 @@ def test_a_class_is_not_configured_before_what_it_depends_on(
             " cleanup box",
         ),
         (
-            "aaa",
-            "aaa",
-            "box",
+            *("aaa", "aaa", "box"),
             "deactivate viewer, deactivate camera, cleanup camera, deactivate box",
         ),
         (
-            "aaa",
-            "aaa",
-            "sensor",
+            *("aaa", "aaa", "sensor"),
             "deactivate viewer, deactivate camera, cleanup camera, deactivate",
         ),
         ("iuu", "iaa", "", "configure viewer"),
@@ -188,7 +131,7 @@ def test_a_class_is_not_configured_before_what_it_depends_on(
     ],
 )
 def test_a_component_is_loaded_while_its_container_is_active(
-    here: str, goal: str, down: str, steps: str
+    here: str, goal: str, down: str, expected: str
 ) -> None:
     system = system_of(
         """
@@ -202,23 +145,13 @@ def test_a_component_is_loaded_while_its_container_is_active(
           sensor: {}
         """
     )
-    at, goals = (
-        {
-            name: LETTERS[letter]
-            for name, letter in zip(("box", "camera", "viewer"), text, strict=True)
-        }
-        | {"sensor": ACTIVE}
-        for text in (here, goal)
-    )
+    names = ("sensor", "box", "camera", "viewer")
+    at, goals = (states(f"a{letters}", names) for letters in (here, goal))
     desired = DesiredState(goals)
     if down:
         desired = desired.fail(fault(down))
-    plan = ", ".join(
-        f"{step.transition} {step.node}" for step in reconcile(system, desired, at, "").steps
-    )
-    assert plan.startswith(steps)
-    if not down:
-        assert plan == steps
+    plan = ", ".join(steps(reconcile(system, desired, at, "")))
+    assert plan.startswith(expected) if down else plan == expected
 
 
 def test_a_second_fault_of_a_failed_node_is_ignored() -> None:
@@ -232,23 +165,13 @@ def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other()
     system = robot()
     desired = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
     down = reconcile(system, desired, states("aaaaa"), "")
-    assert [f"{step.transition} {step.node}" for step in down.steps] == [
-        "deactivate motor",
-        "deactivate logger",
-        "deactivate planner",
-        "deactivate sensor",
-        "cleanup planner",
-        "cleanup sensor",
+    assert steps(down) == [
+        *(f"deactivate {name}" for name in ("motor", "logger", "planner", "sensor")),
+        *("cleanup planner", "cleanup sensor"),
     ]
     desired = desired.restart("planner", 101.0)
     up = reconcile(system, desired, states("uuiia"), "restart")
-    assert [f"{step.transition} {step.node}" for step in up.steps] == [
-        "configure planner",
-        "activate logger",
-    ]
+    assert steps(up) == ["configure planner", "activate logger"]
     desired = desired.restart("sensor", 102.0)
     up = reconcile(system, desired, states("uiiaa"), "restart")
-    assert [f"{step.transition} {step.node}" for step in up.steps][:2] == [
-        "configure sensor",
-        "activate sensor",
-    ]
+    assert steps(up)[:2] == ["configure sensor", "activate sensor"]

@@ -18,13 +18,10 @@ from composer.plan import (
     optional_nodes,
     reconcile,
 )
-from tests.unit.plan.test_reconciliation import (
-    NOW_S,
-    SHUTTING_DOWN,
-    fault,
-    robot,
-    states,
-)
+from tests.unit.support.plans import fault, robot, states, steps
+
+NOW_S = 100.0
+SHUTTING_DOWN = "shutting down the system"
 
 
 def test_restarts_are_due_in_the_order_of_their_times() -> None:
@@ -133,10 +130,7 @@ def test_an_ignored_failure_moves_no_node() -> None:
     desired = DesiredState(states("aaaaa")).tolerate(fault("sensor"))
     assert reconcile(system, desired, states("uaaaa"), "").steps == (), "nor is it brought up"
     plan = reconcile(system, desired, states("uiiaa"), "resumed")
-    assert [f"{step.transition} {step.node}" for step in plan.steps] == [
-        "activate planner",
-        "activate motor",
-    ]
+    assert steps(plan) == ["activate planner", "activate motor"]
     assert decide(system, desired, fault("sensor"), NOW_S) is None, "it is reported once"
     again = Fault("sensor", FaultKind.SILENCE, "silent for 900 ms", serial=0)
     assert decide(system, desired, again, NOW_S) is not None
@@ -222,12 +216,5 @@ def test_an_isolated_node_stays_down_and_the_others_go_on() -> None:
         "#2 deactivate /logger: it needs planner, which is down",
     ]
     assert reconcile(system, desired, states("auiia"), "").steps == ()
-    released = desired.release("planner")
-    assert [
-        step.node for step in reconcile(system, released, states("auiia"), "by hand").steps
-    ] == [
-        "planner",
-        "planner",
-        "logger",
-        "motor",
-    ]
+    up = reconcile(system, desired.release("planner"), states("auiia"), "by hand")
+    assert [step.node for step in up.steps] == ["planner", "planner", "logger", "motor"]

@@ -8,6 +8,7 @@ import pytest
 
 from composer.model import PrimaryState
 from composer.plan import plan_transitions
+from tests.unit.support.plans import states
 from tests.unit.support.resolving import system_of
 
 SYSTEM = system_of(
@@ -21,14 +22,7 @@ SYSTEM = system_of(
     """
 )
 CAUSES = {node.name.value: "asked for" for node in SYSTEM.nodes}
-LETTERS = {"u": PrimaryState.UNCONFIGURED, "i": PrimaryState.INACTIVE, "a": PrimaryState.ACTIVE}
 NAMES = ("low", "left", "right", "top")
-
-
-def states(letters: str) -> dict[str, PrimaryState]:
-    """``aaii``: low and left are active, right and top inactive; ``-`` is left out."""
-    pairs = zip(NAMES, letters, strict=True)
-    return {name: LETTERS[letter] for name, letter in pairs if letter != "-"}
 
 
 @pytest.mark.parametrize(
@@ -65,7 +59,8 @@ def states(letters: str) -> dict[str, PrimaryState]:
     ],
 )  # fmt: skip
 def test_plans(here: str, goal: str, plan: str) -> None:
-    printed = str(plan_transitions(SYSTEM, states(here), states(goal), CAUSES))
+    at, goals = states(here, NAMES), states(goal, NAMES)  # "aaii": low and left are active
+    printed = str(plan_transitions(SYSTEM, at, goals, CAUSES))
     assert printed.replace(": asked for", "").replace("\n", "; ") == plan
 
 
@@ -77,7 +72,7 @@ def test_every_goal_is_reached_from_everywhere_by_legal_steps() -> None:
     ends = {"configure": "i", "activate": "a", "deactivate": "i", "cleanup": "u"}
     for here, goal in itertools.product(ALL, ALL):
         at = dict(zip(NAMES, here, strict=True))
-        plan = plan_transitions(SYSTEM, states(here), states(goal), CAUSES)
+        plan = plan_transitions(SYSTEM, states(here, NAMES), states(goal, NAMES), CAUSES)
         for number, step in enumerate(plan.steps, start=1):
             assert step.number == number
             assert at[step.node] == starts[step.transition]

@@ -9,7 +9,16 @@ import pytest
 
 from composer.model import PortKind, PrimaryState
 from composer.model.qos import Durability, QosProfile, Reliability
-from composer.plan.drift import Drift, DriftKind, ObservedEndpoint, ObservedNode, Snapshot, compare
+from composer.plan.drift import (
+    Debouncer,
+    Drift,
+    DriftChange,
+    DriftKind,
+    ObservedEndpoint,
+    ObservedNode,
+    Snapshot,
+    compare,
+)
 from tests.unit.support.resolving import system_of
 
 SYSTEM = system_of("""
@@ -49,22 +58,15 @@ def found(*nodes: ObservedNode, **options: object) -> tuple[Drift, ...]:
     return compare(SYSTEM, Snapshot(nodes), **options)  # type: ignore[arg-type]
 
 
-def test_a_system_as_declared_has_no_drift() -> None:
-    assert differences(*ALL) == []
-
-
 def test_a_missing_node_is_reported_with_the_most_similar_one() -> None:
+    (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
+    assert "'/clerk' exists" in missing.hint, "in another namespace"
     clark = replace(CLERK, full_name="/front/clark")
     missing, extra = found(clark, GUARD, SLEEPER)
     assert missing.message == "/front/clerk: the node does not exist"
     assert missing.hint == "'/front/clark' exists: did you mean that?"
     assert missing.span is not None
     assert extra.message == "/front/clark: the node exists, but is not declared"
-
-
-def test_a_node_in_another_namespace_is_similar() -> None:
-    (missing, _) = found(replace(CLERK, full_name="/clerk"), GUARD, SLEEPER)
-    assert "'/clerk' exists" in missing.hint
 
 
 def test_undeclared_nodes_are_extra_unless_ignored_hidden_or_the_manager() -> None:
@@ -77,16 +79,10 @@ def test_undeclared_nodes_are_extra_unless_ignored_hidden_or_the_manager() -> No
         "/other/manager: the node exists, but is not declared"
     ]
     assert differences(*ALL, ObservedNode("/rviz2"), ignored=["/rviz*"]) == []
-
-
-@pytest.mark.parametrize("name", ["/stranger", "/_ros2cli_7"])
-def test_another_type_on_a_declared_topic_is_reported_for_any_node(name: str) -> None:
-    stranger = ObservedNode(
-        name, (ObservedEndpoint(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8"),)
-    )
-    assert (
-        f"{name}: type of its publisher /bill is std_msgs/msg/Int8, declared {STRING}"
-    ) in differences(*ALL, stranger, ignored=["/stranger"])
+    for name in ("/rviz2", "/_ros2cli_7"):  # another type is reported for any node
+        other = ObservedEndpoint(PortKind.PUBLISHER, "/bill", "std_msgs/msg/Int8")
+        text = f"{name}: type of its publisher /bill is std_msgs/msg/Int8, declared {STRING}"
+        assert text in differences(*ALL, ObservedNode(name, (other,)), ignored=["/rviz*"])
 
 
 def test_a_missing_endpoint_is_reported_with_the_most_similar_one() -> None:
@@ -98,7 +94,7 @@ def test_a_missing_endpoint_is_reported_with_the_most_similar_one() -> None:
     assert extra.message == "/front/clerk: publisher /bills exists, but is not declared"
 
 
-def test_a_cleaned_up_node_is_reported_with_its_state_and_missing_endpoints() -> None:
+def test_only_an_unconfigured_node_needs_no_endpoints() -> None:
     gone = found(replace(CLERK, endpoints=(), state="unconfigured"), GUARD, SLEEPER)
     assert [drift.message for drift in gone] == [
         "/front/clerk: lifecycle state is unconfigured, declared active",
@@ -106,9 +102,10 @@ def test_a_cleaned_up_node_is_reported_with_its_state_and_missing_endpoints() ->
         "/front/clerk: service /front/ask is missing",
     ]
     assert gone[1].hint == "the node is unconfigured: it has no ports"
-
-
-def test_the_autostart_state_can_be_overridden() -> None:
+    assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
+        "/sleeper: lifecycle state is inactive, declared unconfigured",
+        "/sleeper: publisher /dream is missing",
+    ]
     inactive = replace(CLERK, state="inactive")
     assert differences(inactive, GUARD, SLEEPER, autostart=PrimaryState.INACTIVE) == []
 
@@ -127,6 +124,7 @@ def values(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
+        ({}, []),
         (
             bill(type="std_msgs/msg/Int8"),
             [f"type of publisher /bill is std_msgs/msg/Int8, declared {STRING}"],
@@ -159,13 +157,6 @@ def test_differences_of_a_node(change: dict[str, Any], expected: list[str]) -> N
     assert differences(clerk, GUARD, SLEEPER) == [f"/front/clerk: {text}" for text in expected]
 
 
-def test_an_unconfigured_node_needs_no_endpoints() -> None:
-    assert differences(CLERK, GUARD, replace(SLEEPER, state="inactive")) == [
-        "/sleeper: lifecycle state is inactive, declared unconfigured",
-        "/sleeper: publisher /dream is missing",
-    ]
-
-
 @pytest.mark.parametrize(
     ("kind", "name", "type_name"),
     [
@@ -181,17 +172,69 @@ def test_endpoints_for_tools_are_recognized(kind: PortKind, name: str, type_name
     assert not ObservedEndpoint(kind, f"{name}_more", type_name).is_for_tools
 
 
-def test_ports_of_other_programs_are_compared_only_if_some_are_declared() -> None:
-    driver = ObservedNode("/driver", (BILL,))
-    text = "system: shop\nnodes: {driver: {executable: {command: [driver]}PORTS}}\n"
-    without = system_of(text.replace("PORTS", ""))
-    assert compare(without, Snapshot((driver,))) == ()
-    ports = ", services: {ask: {type: std_srvs/srv/Trigger}}"
-    with_ports = system_of(text.replace("PORTS", ports))
-    assert [drift.kind for drift in compare(with_ports, Snapshot((driver,)))] == [
-        DriftKind.MISSING_ENDPOINT,
-        DriftKind.EXTRA_ENDPOINT,
-    ]
+@pytest.mark.parametrize(
+    ("settings", "nodes", "expected"),
+    [
+        ("}", [ObservedNode("/driver", (BILL,))], []),
+        # its ports are compared only if some are declared
+        (
+            "}, services: {ask: {type: std_srvs/srv/Trigger}}",
+            [ObservedNode("/driver", (BILL,))],
+            ["service /ask is missing", "publisher /bill exists, but is not declared"],
+        ),
+        (
+            ", nodes: [base, drive/wheels]}",
+            [ObservedNode("/base"), ObservedNode("/drive/wheels")],
+            [],
+        ),
+        (", nodes: [base, drive/wheels]}", [ObservedNode("/base")], ["the node does not exist"]),
+    ],
+)
+def test_nodes_and_ports_of_other_programs(
+    settings: str, nodes: list[ObservedNode], expected: list[str]
+) -> None:
+    text = f"system: shop\nnodes: {{driver: {{executable: {{command: [driver]{settings}}}}}\n"
+    found = compare(system_of(text), Snapshot(tuple(nodes)))
+    assert [drift.message.partition(": ")[2] for drift in found] == expected
+
+
+def test_a_parameter_that_is_only_passed_on_may_be_missing() -> None:
+    system = system_of("{system: robot, nodes: {arm: {executable: {command: [arm]}}}}")
+    passed_on = SYSTEM.nodes[0].parameters[:1]
+    system = replace(system, nodes=(replace(system.nodes[0], undeclared_parameters=passed_on),))
+    assert compare(system, Snapshot((ObservedNode("/arm"),))) == ()
+    (wrong,) = compare(system, Snapshot((ObservedNode("/arm", parameters={"speed": 2.0}),)))
+    assert wrong.message == "/arm: parameter speed is 2.0, declared 1.5"
+
+
+SPEED = Drift(DriftKind.WRONG_PARAMETER, "/clerk", "parameter speed", "1.0", "2.0")
+GONE = Drift(DriftKind.MISSING_NODE, "/guard")
+NOTHING = DriftChange((), ())
+
+
+def test_a_short_difference_is_never_reported() -> None:
+    debouncer = Debouncer(2.0)
+    assert debouncer.update(0.0, [SPEED]) == NOTHING
+    assert debouncer.update(1.9, [SPEED]) == NOTHING
+    assert debouncer.update(2.5, []) == NOTHING
+    assert debouncer.update(3.0, [SPEED]) == NOTHING  # counted from the beginning again
+    assert debouncer.reported == ()
+
+
+def test_a_lasting_difference_is_reported_once_and_again_when_resolved() -> None:
+    debouncer = Debouncer(2.0)
+    faster = replace(SPEED, live="3.0")
+    debouncer.update(0.0, [SPEED])
+    assert not debouncer.is_settled([SPEED])
+    assert debouncer.update(2.0, [SPEED, GONE]) == DriftChange((SPEED,), ())
+    assert debouncer.is_settled([SPEED])
+    assert not debouncer.is_settled([SPEED, GONE])
+    assert debouncer.is_settled([])
+    assert debouncer.update(3.0, [SPEED, GONE]) == NOTHING
+    assert debouncer.update(3.1, [faster, GONE]) == DriftChange((faster,), ()), "at once"
+    assert debouncer.update(4.0, [GONE]) == DriftChange((GONE,), (faster,))
+    assert debouncer.reported == (GONE,)
+    assert debouncer.update(5.0, []) == DriftChange((), (GONE,))
 
 
 def test_transforms_are_published_by_their_node_and_received_by_the_manager() -> None:
@@ -217,28 +260,3 @@ def test_transforms_are_published_by_their_node_and_received_by_the_manager() ->
     missing = compare(system, Snapshot((replace(mounts, endpoints=()), viewer)))
     subjects = [item.subject for item in missing if item.node == "/mounts"]
     assert subjects == ["publisher /tf_static"]
-
-
-def test_nodes_in_a_program_are_known() -> None:
-    system = system_of("""
-        system: robot
-        nodes:
-          base: {executable: {command: [base], nodes: [base, drive/wheels]}}
-    """)
-    base, wheels = (ObservedNode(name) for name in ("/base", "/drive/wheels"))
-    assert compare(system, Snapshot((base, wheels))) == ()
-    (missing,) = compare(system, Snapshot((base,)))
-    assert missing.message == "/drive/wheels: the node does not exist"
-
-
-def test_a_parameter_that_is_only_passed_on_may_be_missing() -> None:
-    system = system_of("""
-        system: robot
-        nodes:
-          arm: {executable: {command: [arm]}}
-    """)
-    passed_on = SYSTEM.nodes[0].parameters[:1]
-    system = replace(system, nodes=(replace(system.nodes[0], undeclared_parameters=passed_on),))
-    assert compare(system, Snapshot((ObservedNode("/arm"),))) == ()
-    (wrong,) = compare(system, Snapshot((ObservedNode("/arm", parameters={"speed": 2.0}),)))
-    assert wrong.message == "/arm: parameter speed is 2.0, declared 1.5"
