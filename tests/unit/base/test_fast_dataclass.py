@@ -37,26 +37,17 @@ def point(request: pytest.FixtureRequest, frozen: bool) -> Any:
     return _point(request.param, frozen=frozen, slots=True)
 
 
-def test_objects_compare_by_the_compared_fields(point: Any) -> None:
+def test_comparing_hashing_showing_and_copying(point: Any, frozen: bool) -> None:
     assert point(1, note="a") == point(1, note="b")
     assert point(1) != point(2)
     assert point(1) != (1, 0, "")
     assert point(1) != _point(dataclass)(1)
-
-
-def test_equal_frozen_objects_have_one_hash_and_mutable_ones_none(point: Any, frozen: bool) -> None:
     if frozen:
         assert {point(1, note="a"), point(1, note="b"), point(2)} == {point(1), point(2)}
     else:
         with pytest.raises(TypeError, match="unhashable"):
             hash(point(1))
-
-
-def test_the_representation_names_the_shown_fields(point: Any) -> None:
     assert repr(point(1, note="a", secret="b")).endswith("Point(x=1, y=0, note='a')")
-
-
-def test_objects_can_be_copied_and_changed(point: Any) -> None:
     assert deepcopy(point(1, 2)) == dataclasses.replace(point(1, 0), y=2) == point(1, 2)
     assert dataclasses.asdict(point(1)) == {"x": 1, "y": 0, "note": "", "secret": ""}
     assert not hasattr(point(1), "__dict__")
@@ -110,22 +101,13 @@ class _Own:
         return f"<{self.value}>"
 
 
-def test_classes_without_fields_are_equal_if_their_classes_are() -> None:
+def test_classes_without_fields_or_with_methods_of_their_own() -> None:
     assert _Empty() == _Empty()
     assert hash(_Empty()) == hash(_Empty())
     assert _Empty() != _Identity(1)
-
-
-def test_without_eq_objects_are_equal_to_themselves_only() -> None:
     one = _Identity(1)
     assert one == one  # noqa: PLR0124
     assert one != _Identity(1)
     assert len({one, one, _Identity(1)}) == 2
-
-
-def test_methods_of_the_class_are_kept() -> None:
     assert repr(_Own(3)) == "<3>"
-
-
-def test_objects_can_be_pickled() -> None:
     assert pickle.loads(pickle.dumps(_Own(3))) == _Own(3)

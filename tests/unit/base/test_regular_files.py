@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from composer.base import resources
 from composer.base.regular_files import (
     FileTooLargeError,
     NotRegularError,
@@ -60,3 +61,13 @@ def test_a_full_disk_leaves_no_part_of_a_file(folder: Path) -> None:
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert not (folder / "new").exists()
+
+
+def test_the_share_folder_of_a_wheel_wins_over_folders_next_to_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "site-packages" / "composer"
+    for folder in (package / "share" / "nodes", package.parent / "nodes"):
+        folder.mkdir(parents=True)
+    monkeypatch.setattr(resources, "PACKAGE", package)
+    assert resources.nodes_folder() == package / "share" / "nodes"

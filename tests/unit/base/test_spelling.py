@@ -31,22 +31,18 @@ def test_a_slip_is_seen_through_among_few_names_and_among_many(
     assert Vocabulary(["planner", "motor_controller", *others]).close(name) == [meant]
 
 
-def test_numbered_names_differ_by_their_numbers() -> None:
-    assert Vocabulary(MANY).close("camera_1234_drivr") == ["camera_1234_driver"]
-    assert Vocabulary(MANY).close("amera_1234_driver") == ["camera_1234_driver"]
-
-
-def test_what_is_like_nothing_gets_no_answer() -> None:
-    assert Vocabulary(MANY).close("zzz") == []
-    assert Vocabulary([]).close("zzz") == []
-
-
-def test_several_are_given_with_the_likeliest_first() -> None:
-    assert Vocabulary(["plan", "planner", "plane"]).close("planne", 3) == [
-        "planner",
-        "plane",
-        "plan",
-    ]
+@pytest.mark.parametrize(
+    ("names", "name", "close"),
+    [
+        (MANY, "camera_1234_drivr", ["camera_1234_driver"]),
+        (MANY, "amera_1234_driver", ["camera_1234_driver"]),
+        (MANY, "zzz", []),
+        ([], "zzz", []),
+        (["plan", "planner", "plane"], "planne", ["planner", "plane", "plan"]),
+    ],
+)
+def test_the_likeliest_names_are_first(names: list[str], name: str, close: list[str]) -> None:
+    assert Vocabulary(names).close(name, len(close) or 1) == close
 
 
 def test_the_same_names_are_sorted_once() -> None:
