@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.source import Located, SourceFile, Span
 from composer.client.doctor import CheckResult, Level
 from composer.client.doctor.installation import (
     check_environment,
@@ -18,6 +17,7 @@ from composer.client.doctor.installation import (
 from composer.client.doctor.network import check_declared_discovery, check_network
 from composer.interfaces import Interfaces
 from composer.model import Discovery, DiscoveryKind
+from tests.unit.support.hosts import SPAN, located
 
 
 def problems(results: list[CheckResult]) -> list[tuple[str, str]]:
@@ -48,22 +48,14 @@ def test_problematic_variables_are_reported(
     assert message in found
 
 
-def test_all_invalid_variables_are_reported() -> None:
-    environment = {"ROS_DOMAIN_ID": "-1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "HERE"}
-    assert [level for level, _ in problems(list(check_environment(environment)))] == ["error"] * 2
-
-
 @pytest.mark.parametrize("domain_id", ["", "0", "101", "215", "232"])
 def test_a_valid_environment_is_ok(domain_id: str) -> None:
     (result,) = check_environment({"ROS_DOMAIN_ID": domain_id})
     assert result.level is Level.OK
     assert f"ROS_DOMAIN_ID {domain_id or '0'}, discovery range SUBNET" in result.message
-
-
-def test_the_default_discovery_range_is_subnet() -> None:
-    assert discovery_range({}) == "SUBNET"
+    wrong = {"ROS_DOMAIN_ID": "-1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "HERE"}
+    assert [level for level, _ in problems(list(check_environment(wrong)))] == ["error"] * 2
     assert discovery_range({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}) == "SUBNET"
-    assert discovery_range({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}) == "OFF"
 
 
 def device(folder: Path, name: str, flags: int) -> None:
@@ -77,13 +69,10 @@ def test_usable_interfaces_are_up_and_support_multicast(tmp_path: Path) -> None:
     device(tmp_path, "tunnel", 0x91)
     found = list(check_network("SUBNET", devices=tmp_path, shared_memory=None))
     assert "no network interface is up" in found[0].message
+    assert list(check_network("LOCALHOST", devices=tmp_path, shared_memory=None)) == []
     device(tmp_path, "eth0", 0x1003)
     found = list(check_network("SUBNET", devices=tmp_path, shared_memory=None))
     assert found[0].message == "interfaces with multicast: eth0"
-
-
-def test_the_network_is_not_checked_for_localhost(tmp_path: Path) -> None:
-    assert list(check_network("LOCALHOST", devices=tmp_path, shared_memory=None)) == []
 
 
 def test_unlocked_segments_are_leftovers(tmp_path: Path) -> None:
@@ -106,16 +95,21 @@ def test_the_version_of_rclpy_is_checked() -> None:
     assert "ros2-composer[ros]" in (missing.remedy or "")
 
 
+def interface_package(folder: Path, name: str, field: str) -> Interfaces:
+    """Write a package with one message, and return its definitions."""
+    (folder / name / "msg").mkdir(parents=True)
+    (folder / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    (folder / name / "msg" / "Grip.msg").write_text(f"{field}\n")
+    return Interfaces.load([folder])
+
+
 def test_interface_packages_that_are_not_built_are_reported(tmp_path: Path) -> None:
-    package = tmp_path / "arm_interfaces"
-    (package / "msg").mkdir(parents=True)
-    (package / "package.xml").write_text("<package><name>arm_interfaces</name></package>")
-    (package / "msg" / "Grip.msg").write_text("float64 force\n")
-    sources = Interfaces.load([tmp_path])
+    sources = interface_package(tmp_path, "arm_interfaces", "float64 force")
     (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
     assert (result.level, result.area) == (Level.ERROR, "interfaces")
     assert "'arm_interfaces' is not built" in result.message
     assert (result.remedy or "").startswith("compose interface build arm_interfaces ")
+    package = tmp_path / "arm_interfaces"
     (package / "pyproject.toml").touch()
     (result,) = check_interfaces(["arm_interfaces"], sources, Interfaces.load())
     assert (result.remedy or "").startswith(f"pip install {package} ")
@@ -123,12 +117,8 @@ def test_interface_packages_that_are_not_built_are_reported(tmp_path: Path) -> N
 
 def test_outdated_interface_packages_are_reported(tmp_path: Path) -> None:
     # A package of the standard library stands in for one that is built.
-    for folder, field in (("new", "float64 force"), ("old", "float32 force")):
-        package = tmp_path / folder / "json"
-        (package / "msg").mkdir(parents=True)
-        (package / "package.xml").write_text("<package><name>json</name></package>")
-        (package / "msg" / "Grip.msg").write_text(field + "\n")
-    new, old = (Interfaces.load([tmp_path / name]) for name in ("new", "old"))
+    new = interface_package(tmp_path / "new", "json", "float64 force")
+    old = interface_package(tmp_path / "old", "json", "float32 force")
     (result,) = check_interfaces(["json"], new, old)
     assert result.message.endswith("built from different definitions of json/msg/Grip")
     (result,) = check_interfaces(["json"], new, new)
@@ -136,13 +126,11 @@ def test_outdated_interface_packages_are_reported(tmp_path: Path) -> None:
 
 
 def declared(kind: str, **settings: object) -> Discovery:
-    span = Span(SourceFile("robot.yaml"), 1, 1)
-
-    def located(value: object) -> object:
-        return (Located(value, span),) if isinstance(value, str) else value
-
-    given = {name: located(value) for name, value in settings.items()}
-    return Discovery(Located(DiscoveryKind(kind), span), span, **given)  # type: ignore[arg-type]
+    given = {
+        name: (located(value),) if isinstance(value, str) else value
+        for name, value in settings.items()
+    }
+    return Discovery(located(DiscoveryKind(kind)), SPAN, **given)  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -173,15 +161,12 @@ def test_the_discovery_of_a_system_is_checked(
     assert (result.remedy is None) is (level == "ok")
 
 
-def test_a_port_in_use_is_taken_for_a_server() -> None:
+def test_a_port_in_use_is_taken_for_a_server_and_the_environment_takes_precedence() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
         discovery = declared("server", addresses="127.0.0.1", port=listener.getsockname()[1])
         (result,) = check_declared_discovery(discovery, {})
     assert (result.level, "listens on that port" in result.message) == (Level.OK, True)
-
-
-def test_an_environment_that_overrides_the_discovery_is_reported() -> None:
     environment = {"ROS_DISCOVERY_SERVER": "10.9.9.9:1"}
     (result,) = check_declared_discovery(declared("peers", peers="10.0.0.1"), environment)
     assert result.level is Level.WARNING

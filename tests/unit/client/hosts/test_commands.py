@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.source import Located, SourceFile, Span
+pytest.importorskip("asyncssh", reason="asyncssh is not installed")
+from composer.client.hosts import sync
+from composer.client.hosts.connection import HostError, failure_of, load_keys
 from composer.client.hosts.remote_command import (
     NO_PYTHON,
     NO_SETUP,
@@ -15,22 +17,12 @@ from composer.client.hosts.remote_command import (
     python_command,
     quoted_path,
 )
-from composer.model import Host
+from tests.unit.support.hosts import host, located
 
-SPAN = Span(SourceFile("robot.yaml"), 1, 1)
 PYTHON = """\
 #!/bin/sh
 printf '%s\\n' "$PWD" "$ROS_DOMAIN_ID" "$NOTE" "$@"
 """
-
-
-def located(text: str) -> Located[str]:
-    return Located(text, SPAN)
-
-
-def host(folder: str, **settings: object) -> Host:
-    given = {"address": located("10.0.0.5"), "workspace": located(folder), **settings}
-    return Host(name=located("jetson"), span=SPAN, **given)  # type: ignore[arg-type]
 
 
 def run(command: str, home: Path) -> subprocess.CompletedProcess[str]:
@@ -87,7 +79,6 @@ def test_paths_for_a_shell() -> None:
 
 
 def test_rsync_has_the_options_of_the_host(tmp_path: Path) -> None:
-    sync = pytest.importorskip("composer.client.hosts.sync", reason="asyncssh is not installed")
     there = host(
         "~/robot",
         user=located("pilot"),
@@ -109,7 +100,6 @@ def test_rsync_has_the_options_of_the_host(tmp_path: Path) -> None:
 
 def test_the_workspace_is_not_taken_from_other_output() -> None:
     """Files may be deleted there."""
-    sync = pytest.importorskip("composer.client.hosts.sync", reason="asyncssh is not installed")
     assert sync.folder_in("/opt/ros/jazzy\n\ncompose-workspace:/home/pilot/my robot\n") == (
         "/home/pilot/my robot"
     )
@@ -128,15 +118,13 @@ def test_the_workspace_is_not_taken_from_other_output() -> None:
     ],
 )
 def test_why_a_command_has_failed(code: int, output: str, reason: str) -> None:
-    connection = pytest.importorskip("composer.client.hosts.connection", reason="no asyncssh")
-    error = connection.failure_of(host("~/robot", user=located("pilot")), code, output)
+
+    error = failure_of(host("~/robot", user=located("pilot")), code, output)
     assert str(error).startswith(f"jetson (pilot@10.0.0.5): {reason}")
 
 
 @pytest.mark.parametrize("name", ["keys/none", "~no-such-user/.ssh/id"])
 def test_a_key_that_does_not_exist(tmp_path: Path, name: str) -> None:
-    connection = pytest.importorskip(
-        "composer.client.hosts.connection", reason="asyncssh is missing"
-    )
-    with pytest.raises(connection.HostError, match=f"there is no file '{name}'"):
-        connection.load_keys(host("~/robot", identity_file=name), tmp_path)
+
+    with pytest.raises(HostError, match=f"there is no file '{name}'"):
+        load_keys(host("~/robot", identity_file=name), tmp_path)

@@ -71,24 +71,6 @@ def test_the_end_of_the_input_ends_the_command_in_order() -> None:
         wait_for_end(found)
 
 
-def test_silence_ends_the_command_and_words_keep_it() -> None:
-    while True:  # again if a busy machine has made the words come too late
-        with guarded(1.0) as guard:
-            with speaking(guard) as speaker:
-                assert guard.stdout is not None
-                line = guard.stdout.readline()
-                over_s = time.monotonic() + 1.5
-                while time.monotonic() < over_s:
-                    time.sleep(0.1)  # longer than the silence that is allowed
-                found = [int(word) for word in line.split() if word.isdigit()]
-                was_alive = len(found) == 2 and is_alive(found[0])
-            if speaker.longest_pause_s < 0.9:
-                assert was_alive
-                assert guard.wait(PATIENCE_S) == 7
-                wait_for_end(found)
-                return
-
-
 class Speaker:
     """Writes words to a guard, on a thread, and knows the longest pause between two."""
 
@@ -97,9 +79,12 @@ class Speaker:
         self._guard = guard
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._speak, daemon=True)
-        self._thread.start()
 
-    def stop(self) -> None:
+    def __enter__(self) -> Speaker:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._is_over.set()
         self._thread.join()
 
@@ -115,19 +100,27 @@ class Speaker:
             spoken_s = now_s
 
 
-@contextmanager
-def speaking(guard: subprocess.Popen[str]) -> Iterator[Speaker]:
-    speaker = Speaker(guard)
-    try:
-        yield speaker
-    finally:
-        speaker.stop()
+def test_silence_ends_the_command_and_words_keep_it() -> None:
+    while True:  # again if a busy machine has made the words come too late
+        with guarded(1.0) as guard:
+            with Speaker(guard) as speaker:
+                assert guard.stdout is not None
+                line = guard.stdout.readline()
+                over_s = time.monotonic() + 1.5
+                while time.monotonic() < over_s:
+                    time.sleep(0.1)  # longer than the silence that is allowed
+                found = [int(word) for word in line.split() if word.isdigit()]
+                was_alive = len(found) == 2 and is_alive(found[0])
+            if speaker.longest_pause_s < 0.9:
+                assert was_alive
+                assert guard.wait(PATIENCE_S) == 7
+                wait_for_end(found)
+                return
 
 
 def test_nothing_is_left_by_a_killed_guard() -> None:
-    with guarded(
-        60.0, "import os, signal; print(os.getpid(), flush=True); signal.pause()"
-    ) as guard:
+    code = "import os, signal; print(os.getpid(), flush=True); signal.pause()"
+    with guarded(60.0, code) as guard:
         (command,) = pids(guard)
         os.kill(guard.pid, signal.SIGKILL)
         wait_for_end([command])

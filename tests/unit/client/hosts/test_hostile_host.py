@@ -1,4 +1,4 @@
-"""A host that sends back what it wants: it is bounded, and shown as a part of one line."""
+"""Hosts that refuse, break or send back what they want: bounded, and shown as part of one line."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import time
 from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from composer.base.source import Located, SourceFile, Span
 from composer.model import Host, LogLevel, Process
+from tests.unit.support.hosts import SPAN, host, located
 
 asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 from composer.client.hosts import connection as host_connection  # noqa: E402
@@ -25,21 +26,11 @@ from composer.client.hosts.deployment import Deployment, DeploymentOptions, Remo
 from composer.client.hosts.inventory import Inventory, Question  # noqa: E402
 from composer.client.hosts.start import HostsDiffer, compare_all, connect_all  # noqa: E402
 
-SPAN = Span(SourceFile("robot.yaml"), 1, 1)
 EVIL = "\x1b[2J\x07evil\u202e\r\n[FATAL] [compose] forged "
 HERE = Inventory("3.11", {"numpy": "2.0"}, {}, {"a.yaml": "00"})
 LONGEST = 700
 #: 500 a second and no longer than 2000 bytes, whatever is sent.
 LINES_PER_S, LONGEST_LINE = 500, 2100
-
-
-def host(folder: Path, port: int) -> Host:
-    def text(value: object) -> Located[str]:
-        return Located(str(value), SPAN)
-
-    given: dict[str, Any] = {"workspace": text("~/robot"), "port": port, "user": text("robot")}
-    given |= {"identity_file": str(folder / "key"), "known_hosts": str(folder / "known")}
-    return Host(text("jetson"), SPAN, text("127.0.0.1"), **given)
 
 
 async def endless(process: Any) -> None:
@@ -94,7 +85,9 @@ async def serve(
     port = server.sockets[0].getsockname()[1]
     known = f"[127.0.0.1]:{port} {key.export_public_key().decode()}"
     (folder / "known").write_text(known)
-    other = host(folder, port)
+    keys = {"identity_file": str(folder / "key"), "known_hosts": str(folder / "known")}
+    login = {"address": located("127.0.0.1"), "port": port, "user": located("robot")}
+    other = host(**login, **keys)
     async with server, AsyncExitStack() as stack:
         connections = await connect_all([other], folder, stack)
         await use(other, connections["jetson"])
@@ -133,7 +126,7 @@ def test_lines_of_a_process(tmp_path: Path) -> None:
     logged: list[tuple[LogLevel, str, str]] = []
 
     async def run(other: Host, connection: Any) -> None:
-        process = Process(Located("vision", SPAN), SPAN, host=other.name)
+        process = Process(located("vision"), SPAN, host=other.name)
         item = RemoteProcess(process, other, ("/camera",))
         coordinator = ("/bin/sh", "-c", "exec sleep 600", "--")
         deployed: Deployment
@@ -184,8 +177,60 @@ def test_messages_of_rsync(
     options = sync.SyncOptions(tmp_path, excluded=("a",) * 1000)
     started_s = time.monotonic()
     with pytest.raises(HostError) as refusal:
-        sync.copy_project(host(tmp_path, 22), "/robot", options)
+        sync.copy_project(host(), "/robot", options)
     assert time.monotonic() - started_s < 30.0
     expected = "sends more than 1 MB" if is_endless else "rsync failed: \\x1b[2Jevil"
     assert expected in str(refusal.value)
     assert str(refusal.value).isprintable()
+
+
+def deployment(folder: Path) -> Deployment:
+    process = Process(located("vision"), SPAN, host=host().name)
+    wait = ("/bin/sh", "-c", "trap '' INT; exec sleep 60", "--")
+    options = DeploymentOptions(*(folder, "robot.yaml", (), wait, lambda _: None), lambda *_: None)
+    return Deployment([RemoteProcess(process, host())], options)
+
+
+def test_the_second_request_ends_everything_at_once(tmp_path: Path) -> None:
+    deployed = deployment(tmp_path)
+
+    async def silent(*_: object, **__: object) -> None:
+        await asyncio.sleep(60.0)
+
+    async def run() -> None:
+        connections: Any = {"jetson": SimpleNamespace(create_process=silent, abort=lambda: None)}
+        loop = asyncio.get_running_loop()
+        for delay_s in (0.5, 0.8):
+            loop.call_later(delay_s, deployed.end)
+        await asyncio.wait_for(deployed.run(connections), 8.0)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "text"),
+    [
+        # A refused session is not tried again. The connection is not lost: it would be closed,
+        # and with it all other processes end.
+        (
+            asyncssh.ChannelOpenError(asyncssh.OPEN_CONNECT_FAILED, "open failed"),
+            HostError,
+            "refuses another session",
+        ),
+        # A defect must not leave the system waiting for a process that nothing starts.
+        (KeyError("defect"), KeyError, "defect"),
+    ],
+)
+def test_a_refused_session_and_a_defect_end_everything(
+    tmp_path: Path, error: Exception, kind: type[Exception], text: str
+) -> None:
+    async def broken(*_: object, **__: object) -> None:
+        raise error
+
+    connection: Any = SimpleNamespace(
+        create_process=broken, is_closed=lambda: False, abort=lambda: None
+    )
+    with pytest.raises(kind, match=text) as raised:
+        asyncio.run(deployment(tmp_path).run({"jetson": connection}))
+    if isinstance(raised.value, HostError):
+        assert "MaxSessions" in str(raised.value.hint)

@@ -68,14 +68,19 @@ def all_answers() -> list[Any]:
     ]
 
 
-def test_a_system_that_is_not_certain_is_left_to_the_graph(answers: dict[Any, Any]) -> None:
+def test_answers_are_those_that_were_sent_or_left_to_the_graph(answers: dict[Any, Any]) -> None:
+    ends = (
+        ObservedEndpoint(
+            PortKind.PUBLISHER, "/scan", "sensor_msgs/msg/LaserScan", PRESETS["sensor_data"]
+        ),
+        ObservedEndpoint(PortKind.ACTION_SERVER, "/drive", "some_msgs/action/Drive"),
+    )
+    answers[EndpointsQuery] = EndpointsAnswer({"/a": ends}, ("/a", "/a"))
+    assert local_queries.local_endpoints() == ({"/a": ends}, ["/a", "/a"])
     assert local_queries.local_state("a", LIMIT_S) == "active"
-    answers.update(dict.fromkeys(answers))
-    assert all_answers() == [None] * 8
-
-
-def test_details_are_those_that_were_sent(answers: dict[Any, Any]) -> None:
     assert local_queries.local_details("node", "a", LIMIT_S) == NODE
+    answers.update(dict.fromkeys(answers))  # the system is not certain
+    assert all_answers() == [None] * 8
 
 
 def test_a_name_of_two_nodes_is_left_to_the_graph(answers: dict[Any, Any]) -> None:
@@ -88,13 +93,3 @@ def test_a_name_of_two_nodes_is_left_to_the_graph(answers: dict[Any, Any]) -> No
     answers[NodesQuery] = NodesAnswer(("/x/a", "/y/a"))
     assert local_queries.local_parameters("a", LIMIT_S) is None
     assert local_queries.local_parameters("/x/a", LIMIT_S) is not None
-
-
-def test_endpoints_are_those_that_were_sent(answers: dict[Any, Any]) -> None:
-    profile = PRESETS["sensor_data"]
-    ends = (
-        ObservedEndpoint(PortKind.PUBLISHER, "/scan", "sensor_msgs/msg/LaserScan", profile),
-        ObservedEndpoint(PortKind.ACTION_SERVER, "/drive", "some_msgs/action/Drive"),
-    )
-    answers[EndpointsQuery] = EndpointsAnswer({"/a": ends}, ("/a", "/a"))
-    assert local_queries.local_endpoints() == ({"/a": ends}, ["/a", "/a"])
