@@ -75,10 +75,6 @@ def _damage_chunk(path: Path) -> None:
     path.write_bytes(content)
 
 
-def _as_if_compressed_otherwise(path: Path) -> None:
-    path.write_bytes(path.read_bytes().replace(b"zstd", b"zzzz"))
-
-
 def _with_a_chunk_of_4_gb(path: Path) -> None:
     """Change the size in the index, which ends with the compression and two sizes."""
     content = bytearray(path.read_bytes())
@@ -94,18 +90,17 @@ def _with_a_chunk_of_4_gb_and_no_index(path: Path) -> None:
     path.write_bytes(content[: -len(content) // 4])
 
 
-def _as_text(path: Path) -> None:
-    path.write_text("system: demo")
-
-
 @pytest.mark.parametrize(
     ("damage", "text"),
     [
         (_damage_chunk, "is corrupt or not supported"),
-        (_as_if_compressed_otherwise, "is corrupt or not supported: .*zzzz"),
+        (
+            lambda path: path.write_bytes(path.read_bytes().replace(b"zstd", b"zzzz")),
+            "is corrupt or not supported: .*zzzz",
+        ),
         (_with_a_chunk_of_4_gb, "is corrupt or not supported: it has a chunk of 4,096 MB"),
         (_with_a_chunk_of_4_gb_and_no_index, "it has a chunk of 4,096 MB, more than 256 MB"),
-        (_as_text, "is not an MCAP file"),
+        (lambda path: path.write_text("system: demo"), "is not an MCAP file"),
         (lambda path: path.write_bytes(b""), "is empty"),
         (Path.unlink, "is not a bag: it has neither"),
     ],

@@ -169,20 +169,6 @@ def test_numbers_of_older_versions_are_read() -> None:
     assert values == ("keep_all", "best_effort", "transient_local", "manual_by_topic")
 
 
-@pytest.mark.parametrize("plugin", list(StoragePlugin))
-def test_we_read_what_rosbags_writes(tmp_path: Path, plugin: StoragePlugin) -> None:
-    with RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
-        connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=store())
-        for number in range(20):
-            writer.write(connection, START_NS + number, text(str(number)))
-    bag = open_bag(tmp_path / "bag")
-    assert [item.data for item in read(bag)] == [text(str(number)) for number in range(20)]
-    assert (bag.summary.start_ns, bag.summary.end_ns) == (START_NS, START_NS + 19)
-    assert bag.summary.topics["/chat"].type_name == "std_msgs/msg/String"
-    [part] = bag.messages(frozenset({"/chat"}), START_NS + 3, START_NS + 4)
-    assert part.recorded_ns == START_NS + 3
-
-
 def _with_other_profiles(bag: Path) -> None:
     """The database writes the profiles of its topics in another way than metadata.yaml."""
     [path] = bag.glob("*.db3")
@@ -205,25 +191,32 @@ def _compressed(bag: Path) -> None:
 @pytest.mark.parametrize(
     ("plugin", "change"),
     [
+        (StoragePlugin.SQLITE3, None),
+        (StoragePlugin.MCAP, None),
         (StoragePlugin.SQLITE3, _with_other_profiles),
         (StoragePlugin.SQLITE3, _without_metadata),
         (StoragePlugin.SQLITE3, _compressed),
         (StoragePlugin.MCAP, _compressed),
     ],
 )
-def test_we_read_what_rosbag2_and_users_make_of_it(
-    tmp_path: Path, plugin: StoragePlugin, change: Callable[[Path], None]
+def test_we_read_what_rosbags_writes_and_users_make_of_it(
+    tmp_path: Path, plugin: StoragePlugin, change: Callable[[Path], None] | None
 ) -> None:
     with RosbagsWriter(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
         connection = writer.add_connection("/chat", "std_msgs/msg/String", typestore=store())
         for number in range(20):
             writer.write(connection, START_NS + number, text(str(number)))
-    change(tmp_path / "bag")
+    if change is not None:
+        change(tmp_path / "bag")
     bag = open_bag(tmp_path / "bag")
     assert [item.data for item in read(bag)] == [text(str(number)) for number in range(20)]
+    assert (bag.summary.start_ns, bag.summary.end_ns) == (START_NS, START_NS + 19)
+    assert bag.summary.topics["/chat"].type_name == "std_msgs/msg/String"
     assert bag.summary.counts["/chat"] == 20
     assert list(bag.warnings) == []
     assert all(Path(path).exists() for path in bag.files)
+    [part] = bag.messages(frozenset({"/chat"}), START_NS + 3, START_NS + 4)
+    assert part.recorded_ns == START_NS + 3
 
 
 _ENDED = """

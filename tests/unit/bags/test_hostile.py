@@ -1,9 +1,10 @@
-"""Bags that stand for much more than their size, or whose index is wrong."""
+"""Bags that stand for much more than their size, wrong indexes, and the limit of a recorder."""
 
 from __future__ import annotations
 
 import os
 import resource
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,9 @@ pytest.importorskip("mcap")
 import zstandard
 from mcap.writer import CompressionType, Writer
 
-from composer.bags.bag import BagError
+from composer.bags.bag import BagError, BagMessage, BagTopic
 from composer.bags.reader import open_bag
+from composer.bags.ring import Ring
 from tests.unit.bags.test_form import read
 
 #: Bytes of the message in a file of a few kilobytes, and what reading it may take.
@@ -94,3 +96,21 @@ def test_a_pipe_is_not_read(tmp_path: Path, name: str) -> None:
     os.mkfifo(tmp_path / name)
     with pytest.raises(BagError, match="is neither a file nor a folder"):
         open_bag(tmp_path / name)
+
+
+@pytest.mark.parametrize("size", [1, 10_000])
+def test_a_flight_recorder_whose_clock_is_set_back(
+    monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    """No message is old then, and small messages take more memory than their bytes."""
+    monkeypatch.setattr("composer.bags.ring.LARGEST_BYTES", 1_000_000)
+    ring = Ring(seconds=10.0)
+    ring.add_topic(BagTopic("/chat", "std_msgs/msg/String"))
+    tracemalloc.start()
+    try:
+        for number in range(20_000):
+            ring.write(BagMessage("/chat", 10**18 - number, 10**18 - number, bytes(size)))
+        used_bytes, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert used_bytes < 1_500_000

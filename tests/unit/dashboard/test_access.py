@@ -120,13 +120,13 @@ def test_a_program_that_knows_the_token_needs_no_origin() -> None:
     assert status(ws=True, cookie="", query="token=wrong", origin="https://app.example") == 403
 
 
-def test_the_cookie_is_not_sent_for_other_sites_nor_read_by_scripts() -> None:
+def test_the_cookie_alone_opens_no_websocket() -> None:
+    """Browsers send it to the servers of other users on this computer as well.
+
+    They do not send it for other sites, and no script reads it.
+    """
     assert LOCAL.cookie.endswith("; HttpOnly; SameSite=Strict; Path=/")
     assert TOKEN not in LOCAL.cookie
-
-
-def test_the_cookie_alone_opens_no_websocket() -> None:
-    """Browsers send it to the servers of other users on this computer as well."""
     for query in ("key=", "key=wrong", f"key={OTHER.key}", f"key={LOCAL.key}&key={LOCAL.key}"):
         assert status(ws=True, query=query, origin=f"http://{OWN}") == 401
     assert status(query="key=wrong") == 401  # how the page learns that its key is old
@@ -137,13 +137,6 @@ def test_the_cookie_alone_opens_no_websocket() -> None:
 def test_tokens_are_random_and_long() -> None:
     assert len({new_token() for _ in range(100)}) == 100
     assert len(new_token()) >= 43
-
-
-def test_a_token_file(tmp_path: Path) -> None:
-    path = tmp_path / "token"
-    path.write_text(f"{TOKEN}\n")
-    path.chmod(0o600)
-    assert read_token(path) == TOKEN
 
 
 @pytest.mark.parametrize(
@@ -161,12 +154,12 @@ def test_a_token_file_that_is_not_safe(
     content: str, mode: int, reason: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "token"
+    with pytest.raises(InvalidTokenFileError, match="No such file"):
+        read_token(path)
     path.write_text(content)
     path.chmod(mode)
     with pytest.raises(InvalidTokenFileError, match=reason):
         read_token(path)
-
-
-def test_a_missing_token_file(tmp_path: Path) -> None:
-    with pytest.raises(InvalidTokenFileError, match="No such file"):
-        read_token(tmp_path / "token")
+    path.chmod(0o600)
+    path.write_text(f"{TOKEN}\n")
+    assert read_token(path) == TOKEN

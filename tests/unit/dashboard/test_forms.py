@@ -22,14 +22,11 @@ def _by_name(fields: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return {field["name"]: field for field in fields}
 
 
-def test_ranges_constants_and_defaults(forms: Forms) -> None:
+def test_parts_ranges_constants_comments_and_arrays(forms: Forms) -> None:
     status = _by_name(forms.form("sensor_msgs/msg/NavSatStatus")["message"])["status"]
     assert (status["kind"], status["minimum"], status["maximum"]) == ("integer", -128, 127)
     assert {"name": "STATUS_FIX", "value": 0} in status["constants"]
     assert not any(item["name"].startswith("SERVICE") for item in status["constants"])
-
-
-def test_parts_comments_and_nested_messages(forms: Forms) -> None:
     form = forms.form("composer_interfaces/srv/PlanTrajectory")
     assert list(form) == ["request", "response"]
     request = _by_name(form["request"])
@@ -37,9 +34,6 @@ def test_parts_comments_and_nested_messages(forms: Forms) -> None:
     assert [field["name"] for field in request["start"]["fields"]] == ["x", "y", "z"]
     assert _by_name(form["response"])["success"]["kind"] == "boolean"
     assert list(forms.form("composer_interfaces/action/Navigate")) == ["goal", "result", "feedback"]
-
-
-def test_arrays(forms: Forms) -> None:
     fields = _by_name(forms.form("geometry_msgs/msg/PoseWithCovariance")["message"])
     assert (fields["covariance"]["kind"], fields["covariance"]["size"]) == ("array", 36)
     assert fields["covariance"]["element"]["kind"] == "number"

@@ -1,4 +1,4 @@
-"""What waits for a browser stays within bounds, and drops are counted."""
+"""What waits for a browser, and what is read for it, stays within bounds; drops are counted."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composer.dashboard.observing.topics import MAX_BYTES_PER_S, ByteLimit, large_profile
 from composer.dashboard.protocol.outbox import (
     CONNECTION_BYTES,
     MAX_BATCHES,
@@ -16,6 +17,7 @@ from composer.dashboard.protocol.outbox import (
     Outbox,
     Update,
 )
+from composer.model.qos import Durability, QosProfile, Reliability
 
 
 def next_message(outbox: Outbox) -> str | bytes:
@@ -56,26 +58,18 @@ def test_messages_wait_in_order_and_the_oldest_are_dropped() -> None:
     assert [message["seq"] for message in found] == list(range(MAX_BATCHES))
 
 
-def test_replies_come_first_and_subscriptions_take_turns() -> None:
+def test_replies_come_first_and_subscriptions_take_turns_until_they_are_closed() -> None:
     outbox = Outbox()
-    for number in (1, 2):
+    for number in (1, 2, 3):
         outbox.open(number, "echo", Delivery.QUEUE)
         outbox.put(number, Update('"first"'))
         outbox.put(number, Update('"second"'))
+    outbox.close(3)
+    outbox.put(3, Update('"third"'))
     outbox.reply('{"id": 7}')
     assert received(outbox) == {"id": 7}
     order = [(message["sub"], message["data"]) for message in map(received, [outbox] * 4)]
     assert order == [(1, "first"), (2, "first"), (1, "second"), (2, "second")]
-
-
-def test_nothing_is_kept_for_a_closed_subscription() -> None:
-    outbox = Outbox()
-    outbox.open(1, "echo", Delivery.QUEUE)
-    outbox.put(1, Update("1"))
-    outbox.close(1)
-    outbox.put(1, Update("2"))
-    outbox.reply("{}")
-    assert received(outbox) == {}
     assert outbox.budget.used == 0
 
 
@@ -124,3 +118,35 @@ def test_replies_that_are_not_read_are_limited_in_bytes() -> None:
         outbox.reply("x" * 1_000_000)
     assert outbox.is_full_of_replies
     assert outbox.budget.used <= CONNECTION_BYTES
+
+
+@pytest.mark.parametrize("size", [100, 1_000_000, 50_000_000])
+def test_the_bytes_per_second_are_limited(size: int) -> None:
+    limit, read = ByteLimit(), 0
+    for poll in range(1000):  # 10 s with 10 messages each 10 ms
+        if limit.allows(100.0 + poll * 0.01):
+            for _ in range(10):
+                limit.count(size)
+                read += size
+    offered = 10_000 * size
+    # A burst at the start, and what is read at once may exceed the limit until it is made up for.
+    assert read == offered or 0.9 <= read / (10 * MAX_BYTES_PER_S) <= 1.1 + size / MAX_BYTES_PER_S
+    assert (read == offered) == (size == 100)
+
+
+def test_a_pause_does_not_add_up() -> None:
+    limit = ByteLimit()
+    assert limit.allows(0.0)
+    assert limit.allows(1e6)
+    limit.count(MAX_BYTES_PER_S)
+    assert not limit.allows(1e6 + 0.5)
+    assert limit.allows(1e6 + 1.0)
+
+
+def test_large_messages_are_requested_so_that_nothing_waits_for_the_reader() -> None:
+    profile = QosProfile(depth=200, reliability=Reliability.RELIABLE)
+    large = large_profile(profile)
+    assert (large.depth, large.reliability) == (5, Reliability.BEST_EFFORT)
+    assert large_profile(large) == large
+    kept = QosProfile(depth=1, durability=Durability.TRANSIENT_LOCAL)
+    assert large_profile(kept) == kept

@@ -37,15 +37,13 @@ def test_encodings(encoding: str, data: list[int], expected: list[int]) -> None:
     assert pixels.to_rgba(image(encoding, 2, 1, bytes(data)), 100) == (2, 1, bytes(expected))
 
 
-def test_depths_are_spread_and_nan_is_black() -> None:
-    data = np.array([1.0, 3.0, np.nan, np.inf], dtype="<f4").tobytes()
-    _, _, rgba = pixels.to_rgba(image("32FC1", 4, 1, data), 100)
+def test_depths_are_spread_nan_is_black_and_colors_are_filtered() -> None:
+    depths = np.array([1.0, 3.0, np.nan, np.inf], dtype="<f4").tobytes()
+    _, _, rgba = pixels.to_rgba(image("32FC1", 4, 1, depths), 100)
     assert list(rgba[::4]) == [0, 255, 0, 0]
-
-
-def test_a_color_filter() -> None:
-    data = bytes([10, 20, 30, 40])  # RG over GB
-    assert pixels.to_rgba(image("bayer_rggb8", 2, 2, data), 100) == (1, 1, bytes([10, 20, 40, 255]))
+    colors = bytes([10, 20, 30, 40])  # RG over GB
+    filtered = pixels.to_rgba(image("bayer_rggb8", 2, 2, colors), 100)
+    assert filtered == (1, 1, bytes([10, 20, 40, 255]))
 
 
 def test_large_images_become_smaller_and_padding_is_left_out() -> None:
