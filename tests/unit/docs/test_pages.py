@@ -1,4 +1,4 @@
-"""docs/language.md is up to date, and the links in docs/ are valid."""
+"""docs/language.md and the diagrams are up to date, and the links in docs/ are valid."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from composer.language.schema import SCHEMAS, check_schema, kind_of, schema
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
 GUIDES = sorted((ROOT / "docs").rglob("*.md"))
+TOOL = runpy.run_path(str(ROOT / "tools" / "draw_pictures.py"))
+PICTURES: dict[str, tuple[str, str]] = TOOL["PICTURES"]
 
 
 def test_the_page_is_up_to_date() -> None:
@@ -59,3 +61,22 @@ def anchors(page: Path) -> set[str]:
     """The anchors that GitHub gives to the headings of a page."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("name", sorted(PICTURES))
+def test_a_picture_is_up_to_date(name: str) -> None:
+    current = (ROOT / "docs" / "pictures" / name).read_bytes()
+    assert current == TOOL["drawn"](*PICTURES[name]), "run: make generate"
+
+
+def test_all_pictures_are_generated_and_used() -> None:
+    # Pictures of the dashboard are PNGs: see tests/ros/dashboard/test_pictures.py.
+    files = {path.name for path in (ROOT / "docs" / "pictures").glob("*.svg")}
+    # "editor-python.svg": see tests/language_server. "terminal.svg" shows the times of one run.
+    assert files == {*PICTURES, "editor-python.svg", "terminal.svg"}
+    shown = {
+        name
+        for page in (ROOT / "README.md", *GUIDES)
+        for name in re.findall(r"pictures/([\w-]+\.svg)", page.read_text(encoding="utf-8"))
+    }
+    assert shown == files
