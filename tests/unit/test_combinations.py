@@ -131,14 +131,6 @@ def chosen(path: Path, *arguments: str) -> list[str]:
     return [node.name.value for node in result.system.nodes]
 
 
-def test_arguments_choose_the_nodes(tmp_path: Path) -> None:
-    path = written(tmp_path, ROBOT)
-    assert chosen(path) == ["velodyne", "mapping"]
-    assert chosen(path, "lidar=ouster") == ["ouster", "mapping"]
-    assert chosen(path, "lidar=ouster", "simulation=True") == ["simulator", "mapping"]
-    assert diagnostics_in(tmp_path, ROBOT) == []
-
-
 @pytest.mark.parametrize(
     ("old", "new", "messages"),
     [
@@ -239,8 +231,7 @@ def test_an_include_may_be_left_out(old: str, new: str, rules: list[str], tmp_pa
     assert [item.rule.name for item in found if item.rule.name not in known] == rules
 
 
-def test_an_empty_loop_leaves_nothing(tmp_path: Path) -> None:
-    text = """\
+LOOP = """\
 system: fleet
 arguments: {robots: 2}
 nodes:
@@ -253,21 +244,32 @@ nodes:
 connections:
   - {topic: state, from: robot_*.state, to: tower.state}
 """
-    path = written(tmp_path, text)
-    assert chosen(path, "robots=0") == ["tower"]
-    assert chosen(path, "robots=1") == ["robot_0", "tower"]
-
-
-def test_an_include_may_have_no_copy(tmp_path: Path) -> None:
-    text = """\
+COPIES = """\
 system: fleet
 arguments: {robots: 1}
 include: [{file: part.yaml, for_each: {i: "${robots}"}, prefix: "robot_${i}_"}]
 nodes: {tower: {lifecycle: {depends_on: [robot_*_arm]}, on_activate: {log: started}}}
 """
-    path = written(tmp_path, text, part="system: part\nnodes: {arm: {on_activate: {log: started}}}")
-    assert chosen(path, "robots=0") == ["tower"]
-    assert chosen(path) == ["robot_0_arm", "tower"]
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "nodes"),
+    [
+        (ROBOT, (), ["velodyne", "mapping"]),
+        (ROBOT, ("lidar=ouster",), ["ouster", "mapping"]),
+        (ROBOT, ("lidar=ouster", "simulation=True"), ["simulator", "mapping"]),
+        (LOOP, ("robots=0",), ["tower"]),
+        (LOOP, ("robots=1",), ["robot_0", "tower"]),
+        (COPIES, ("robots=0",), ["tower"]),
+        (COPIES, (), ["robot_0_arm", "tower"]),
+    ],
+)
+def test_arguments_choose_the_nodes(
+    tmp_path: Path, text: str, arguments: tuple[str, ...], nodes: list[str]
+) -> None:
+    part = "system: part\nnodes: {arm: {on_activate: {log: started}}}"
+    assert chosen(written(tmp_path, text, part=part), *arguments) == nodes
+    assert text is not ROBOT or diagnostics_in(tmp_path, text) == []
 
 
 def test_an_argument_without_a_value_is_needed_to_run_only(tmp_path: Path) -> None:

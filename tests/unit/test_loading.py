@@ -54,11 +54,8 @@ def test_everything_that_comes_with_the_composer_is_without_errors(path: Path) -
 
 
 def test_one_run_shows_what_every_stage_finds(tmp_path: Path, interfaces: Interfaces) -> None:
-    write(
-        tmp_path,
-        "node: camera\nservices: {ask: {typ: std_srvs/srv/Trigger}}\n",
-        "nodes/camera.yaml",
-    )
+    camera = "node: camera\nservices: {ask: {typ: std_srvs/srv/Trigger}}\n"
+    write(tmp_path, camera, "nodes/camera.yaml")
     path = write(
         tmp_path,
         """\
@@ -92,19 +89,12 @@ nodes:
 
 def test_the_command_line_is_checked_like_the_file(tmp_path: Path, interfaces: Interfaces) -> None:
     path = write(tmp_path, GOOD)
-    loading = load(
-        path,
-        overrides=OverrideOptions(
-            ("talker.speed=9.0", "talker.sped=1.0", "missing.speed=1.0", "nonsense"), "//"
-        ),
-        interfaces=interfaces,
-    )
-    found = errors(loading)
-    assert "--set:1 parameter-value" in found
-    assert "--set:2 unknown-parameter" in found
-    assert "--set:3 unknown-node" in found
-    assert "--set:4 invalid-override" in found
-    assert "--namespace:1 invalid-name" in found
+    settings = ("talker.speed=9.0", "talker.sped=1.0", "missing.speed=1.0", "nonsense")
+    loading = load(path, overrides=OverrideOptions(settings, "//"), interfaces=interfaces)
+    assert set(errors(loading)) >= {
+        *("--set:1 parameter-value", "--set:2 unknown-parameter", "--set:3 unknown-node"),
+        *("--set:4 invalid-override", "--namespace:1 invalid-name"),
+    }
 
 
 @pytest.mark.parametrize(
