@@ -7,7 +7,7 @@ from difflib import SequenceMatcher
 import pytest
 
 from composer.base import spelling
-from composer.base.spelling import LONGEST_NAME, Vocabulary, edit_distance, is_typo, vocabulary
+from composer.base.spelling import LONGEST_NAME, Vocabulary, edit_distance, is_typo
 
 MANY = [f"camera_{number}_driver" for number in range(3000)]
 
@@ -43,11 +43,6 @@ def test_a_slip_is_seen_through_among_few_names_and_among_many(
 )
 def test_the_likeliest_names_are_first(names: list[str], name: str, close: list[str]) -> None:
     assert Vocabulary(names).close(name, len(close) or 1) == close
-
-
-def test_the_same_names_are_sorted_once() -> None:
-    assert vocabulary(("b", "a")) is vocabulary(("b", "a"))
-    assert vocabulary(("b", "a")).names == ("a", "b")
 
 
 def test_names_longer_than_any_in_ros_are_not_compared() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -17,19 +19,19 @@ from composer.runtime.executors.exceptions import (
 )
 
 
-class TextRaises(Exception):
+class Odd(Exception):
+    """An exception whose text is what a function returns or raises."""
+
+    def __init__(self, text: Callable[[], Any]) -> None:
+        super().__init__()
+        self._text = text
+
     def __str__(self) -> str:
-        raise ValueError("no text")
+        return self._text()
 
 
-class TextExits(Exception):
-    def __str__(self) -> str:
-        raise SystemExit(1)
-
-
-class TextIsANumber(Exception):
-    def __str__(self) -> str:
-        return 3  # type: ignore[return-value]  # noqa: PLE0307 - on purpose
+def no_text() -> str:
+    raise ValueError("no text")
 
 
 class Text(str):
@@ -40,11 +42,6 @@ class Text(str):
 
     def __format__(self, _: str) -> str:
         raise RuntimeError
-
-
-class TextIsASubclass(Exception):
-    def __str__(self) -> str:
-        return Text("a strange text")
 
 
 class NameRaises(type):
@@ -86,10 +83,10 @@ FAILED = "<its text is not available: __str__ failed>"
         (ValueError(), "ValueError"),
         (KeyError("a"), "KeyError: 'a'"),
         (GeneratorExit("out"), "GeneratorExit: out"),
-        (TextRaises(), f"TextRaises: {FAILED}"),
-        (TextExits(), f"TextExits: {FAILED}"),
-        (TextIsANumber(), f"TextIsANumber: {FAILED}"),
-        (TextIsASubclass(), "TextIsASubclass: a strange text"),
+        (Odd(no_text), f"Odd: {FAILED}"),
+        (Odd(sys.exit), f"Odd: {FAILED}"),
+        (Odd(lambda: 3), f"Odd: {FAILED}"),
+        (Odd(lambda: Text("a strange text")), "Odd: a strange text"),
         (KindWithoutName("why"), "exception: why"),
         (NotesRaise("why"), "NotesRaise: why"),
         (ValueError("\udc80"), "ValueError: \\udc80"),
@@ -115,7 +112,7 @@ def test_a_huge_text_is_cut() -> None:
     [
         (text_of(CallError("no server")), "no server"),
         (text_of(CallError()), "CallError"),
-        (text_of(TextRaises()), f"TextRaises: {FAILED}"),
+        (text_of(Odd(no_text)), f"Odd: {FAILED}"),
         (shown([1, 2]), "[1, 2]"),
         (shown(ReprRaises()), "a ReprRaises whose __repr__ failed"),
         (f"{len(shown('x' * 10_000))}", "80"),
@@ -133,7 +130,7 @@ def test_texts_of_exceptions_and_values(found: str, expected: str) -> None:
 def test_a_report_has_the_frames_of_user_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
     with pytest.raises(ValueError, match="no text") as caught:
-        printable(TextRaises())
+        printable(Odd(no_text))
     assert 'test_exceptions.py", line' in report_of(caught.value)
     assert "executors/exceptions.py" not in report_of(caught.value)
     assert report_of(ValueError("never raised")) == "ValueError: never raised"

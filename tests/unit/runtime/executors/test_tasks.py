@@ -241,7 +241,9 @@ class TestCanceling:
         with pytest.raises(Cancelled):
             outcome.result()
 
-    def test_a_task_canceled_before_its_start_never_runs(self, loop: Loop) -> None:
+    def test_before_its_start_a_task_never_runs_and_an_awaited_future_cancels_it(
+        self, loop: Loop
+    ) -> None:
         seen: list[bool] = []
 
         async def work() -> None:
@@ -249,8 +251,13 @@ class TestCanceling:
 
         loop.task(work()).future.cancel()
         loop.run()
-        assert seen == []
-        assert loop.ended == 1
+        assert (seen, loop.ended) == ([], 1)
+        gate: Future[None] = Future()
+        outcome = loop.start(wait_for(gate))
+        gate.cancel()
+        loop.run()
+        assert outcome.cancelled()
+        assert loop.reports == []
 
     def test_the_awaited_future_does_not_wake_a_canceled_task(self, loop: Loop) -> None:
         gate: Future[str] = Future()
@@ -285,14 +292,6 @@ class TestCanceling:
         loop.start(work()).cancel()
         loop.run()
         assert [str(error) for _, error in loop.reports] == ["while cleaning up"]
-
-    def test_awaiting_a_canceled_future_cancels(self, loop: Loop) -> None:
-        gate: Future[None] = Future()
-        outcome = loop.start(wait_for(gate))
-        gate.cancel()
-        loop.run()
-        assert outcome.cancelled()
-        assert loop.reports == []
 
     def test_closing_ends_the_coroutine_at_once(self, loop: Loop) -> None:
         seen: list[str] = []

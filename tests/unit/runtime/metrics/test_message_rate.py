@@ -1,8 +1,12 @@
+"""Rates of messages, and the limit on repeated log lines, which are counted."""
+
 from __future__ import annotations
 
 import pytest
 
+from composer.runtime.clock.clock import COMPUTER, RealClock
 from composer.runtime.metrics.figures import CountedRate, MessageRate
+from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 
 @pytest.mark.parametrize(
@@ -59,3 +63,45 @@ def test_a_counter_has_a_rate_from_change_to_change(
         rate.read(count, at_s)
     hertz = rate.current_hz(readings[-1][1])
     assert hertz == (None if expected_hz is None else pytest.approx(expected_hz))
+
+
+class SetClock(RealClock):
+    now_s = 100.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
+def test_one_line_per_subject_and_period_and_a_limited_number_of_subjects() -> None:
+    clock = SetClock()
+    limit = RepeatLimit(clock, period_s=1.0)
+    first = limit.admit("a")
+    assert first is not None
+    assert (first.is_first, first.suffix) == (True, "")
+    assert limit.admit("a") is limit.admit("a") is None
+    clock.now_s += 1.0
+    again = limit.admit("a")
+    assert again is not None
+    assert (again.is_first, again.suffix) == (False, " (2 more since the last message)")
+    clock.now_s += 1.0
+    assert (limit.admit("a") or first).suffix == ""
+    admitted = [limit.admit(f"subject {number}") for number in range(3000)]
+    assert sum(item is not None for item in admitted) == 1000, "999 subjects, and all others"
+    clock.now_s += 1.0
+    admitted = [limit.admit(f"new {number}") for number in range(1000)]
+    assert all(item is not None for item in admitted), "the others are forgotten"
+
+
+def test_a_line_may_cause_another_one_at_any_moment() -> None:
+    """As garbage collection does, if it finds an exception that was never retrieved."""
+    limit = RepeatLimit(COMPUTER)
+
+    class Subject(str):
+        __slots__ = ()
+
+        def __hash__(self) -> int:
+            limit.admit("garbage")
+            return super().__hash__()
+
+    assert limit.admit(Subject("line")) is not None
+    assert limit.admit("garbage") is None

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
-from composer.base.source import Located, SourceFile, Span
+from composer.base.source import Located
 from composer.model import Discovery, DiscoveryKind
 from composer.runtime.middleware.dds_profiles import is_own_profile, use_discovery_profile
 from composer.runtime.middleware.dds_xml import profile_with_segment, use_interfaces
@@ -26,9 +24,10 @@ from composer.runtime.middleware.environment import (
 from composer.runtime.process import StartRefused
 from composer.runtime.process.computer import PortState, port_state
 from composer.runtime.process.instance_lock import hold_instance_lock
+from tests.unit.support.hosts import SPAN, located
 
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
-SPAN = Span(SourceFile("robot.yaml"), 1, 1)
+
 SERVER = {"ROS_DISCOVERY_SERVER": "10.0.0.1:11811", "ROS_SUPER_CLIENT": "TRUE"}
 PEERS = {"ROS_STATIC_PEERS": "10.0.0.1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
@@ -42,11 +41,11 @@ def runtime_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def texts(*values: str) -> tuple[Located[str], ...]:
-    return tuple(Located(value, SPAN) for value in values)
+    return tuple(map(located, values))
 
 
 def discovery(kind: str, **settings: Any) -> Discovery:
-    return Discovery(Located(DiscoveryKind(kind), SPAN), SPAN, **settings)
+    return Discovery(located(DiscoveryKind(kind)), SPAN, **settings)
 
 
 SERVER_AT_10 = discovery("server", addresses=texts("10.0.0.1"))
@@ -99,37 +98,25 @@ def test_assignments_can_be_pasted_into_a_shell() -> None:
     assert as_assignments(variables) == "ROS_DISCOVERY_SERVER='a:1;b:2' ROS_SUPER_CLIENT=TRUE"
 
 
-@pytest.fixture
-def running() -> Iterator[ExitStack]:
-    with ExitStack() as stack:
-        yield stack
+def adopted(environment: dict[str, str]) -> tuple[str | None, dict[str, str]]:
+    """Return the warning, and the environment of a command that has begun with this one."""
+    return adopt_discovery(environment), environment
 
 
-def test_a_command_adopts_the_discovery_of_running_systems(running: ExitStack) -> None:
-    environment: dict[str, str] = {}
-    assert adopt_discovery(environment) is None
+def test_a_command_adopts_the_discovery_of_running_systems_unless_they_differ() -> None:
+    assert adopted({}) == (None, {})
+    with (
+        hold_instance_lock("/robot", {**SERVER, "LD_PRELOAD": "/evil.so"}),
+        hold_instance_lock("/robot/acting", SERVER),
+    ):
+        assert adopted({}) == (None, SERVER), "and no other variable"
+        by_user = {"ROS_STATIC_PEERS": "10.0.0.7"}
+        assert adopted(dict(by_user)) == (None, by_user)
+    assert adopted({}) == (None, {})
+    with hold_instance_lock("/robot", SERVER), hold_instance_lock("/lab"):
+        warning, environment = adopted({})
     assert environment == {}
-    running.enter_context(hold_instance_lock("/robot", {**SERVER, "LD_PRELOAD": "/evil.so"}))
-    running.enter_context(hold_instance_lock("/robot/acting", SERVER))
-    assert adopt_discovery(environment) is None
-    assert environment == SERVER, "and no other variable"
-    environment = {"ROS_STATIC_PEERS": "10.0.0.7"}
-    assert adopt_discovery(environment) is None
-    assert environment == {"ROS_STATIC_PEERS": "10.0.0.7"}, "the user has set it"
-    running.close()
-    environment.clear()
-    adopt_discovery(environment)
-    assert environment == {}
-
-
-def test_a_command_adopts_nothing_if_systems_differ(running: ExitStack) -> None:
-    running.enter_context(hold_instance_lock("/robot", SERVER))
-    running.enter_context(hold_instance_lock("/lab"))
-    environment: dict[str, str] = {}
-    warning = adopt_discovery(environment)
-    assert environment == {}
-    assert warning is not None
-    assert "/lab: multicast; /robot: ROS_DISCOVERY_SERVER=10.0.0.1:11811" in warning
+    assert "/lab: multicast; /robot: ROS_DISCOVERY_SERVER=10.0.0.1:11811" in str(warning)
 
 
 def settings_of(path: str) -> list[tuple[str, str]]:
@@ -137,10 +124,22 @@ def settings_of(path: str) -> list[tuple[str, str]]:
     return [(item.tag.rpartition("}")[2], (item.text or "").strip()) for item in elements]
 
 
-def test_interfaces_are_limited_by_a_profile_that_processes_share(tmp_path: Path) -> None:
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    """An environment in which the default profile is selected."""
+    selected: dict[str, str] = {}
+    use_discovery_profile(selected, tmp_path)
+    return selected
+
+
+def test_interfaces_are_limited_by_a_profile_that_processes_share(
+    environment: dict[str, str], tmp_path: Path
+) -> None:
+    for text in ("no-such-device", "203.0.113.77"):
+        with pytest.raises(StartRefused, match=f"no network interface '{text}'") as refused:
+            use_interfaces(discovery("multicast", interfaces=texts(text)), environment)
+        assert "lo" in refused.value.hint
     wanted = discovery("multicast", interfaces=texts("lo", "127.0.0.1"))
-    environment: dict[str, str] = {}
-    use_discovery_profile(environment, tmp_path)
     default = settings_of(environment[PROFILES])
     assert use_interfaces(wanted, environment) == []
     path = environment[PROFILES]
@@ -156,9 +155,9 @@ def test_interfaces_are_limited_by_a_profile_that_processes_share(tmp_path: Path
     assert environment[PROFILES] == path
 
 
-def test_the_profile_for_large_messages_keeps_interfaces_and_has_peers(tmp_path: Path) -> None:
-    environment: dict[str, str] = {}
-    use_discovery_profile(environment, tmp_path)
+def test_the_profile_for_large_messages_keeps_interfaces_and_has_peers(
+    environment: dict[str, str], tmp_path: Path
+) -> None:
     enlarged = tmp_path / "enlarged.xml"
     enlarged.write_bytes(profile_with_segment(environment[PROFILES], ["10.0.0.7", "jetson"]))
     addresses = [text for name, text in settings_of(str(enlarged)) if name == "address"]
@@ -168,15 +167,6 @@ def test_the_profile_for_large_messages_keeps_interfaces_and_has_peers(tmp_path:
     settings = settings_of(str(enlarged))
     assert ("interface", "lo") in settings
     assert [name for name, _ in settings].count("transport_descriptor") == 2
-
-
-def test_an_interface_that_does_not_exist_is_refused(tmp_path: Path) -> None:
-    environment: dict[str, str] = {}
-    use_discovery_profile(environment, tmp_path)
-    for text in ("no-such-device", "203.0.113.77"):
-        with pytest.raises(StartRefused, match=f"no network interface '{text}'") as refused:
-            use_interfaces(discovery("multicast", interfaces=texts(text)), environment)
-        assert "lo" in refused.value.hint
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,17 @@
-"""Shared memory that killed processes left is removed."""
+"""What DDS uses of this computer: shared memory, ports of participants, receive buffers."""
 
 from __future__ import annotations
 
 import fcntl
 import os
+import socket
 import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from composer.runtime.middleware.dds_participants import count_participants, enlarge_receive_buffers
 from composer.runtime.middleware.shared_memory import (
     remove_dead_segments,
     remove_incomplete_ports,
@@ -118,3 +120,35 @@ def test_segments_are_removed_if_nothing_locks_them(tmp_path: Path) -> None:
     assert not dead & remain
     assert {names["a1e"], names["feed"], lone.name, link.name} < remain
     assert len(remain) == 7
+
+
+HEAD = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  inode\n"
+
+
+def table(folder: Path, *ports: int) -> Path:
+    lines = (f"  {port}: 00000000:{port:04X} 00000000:0000 07\n" for port in ports)
+    (folder / "udp").write_text(HEAD + "".join(lines), encoding="ascii")
+    return folder / "udp"
+
+
+def test_a_participant_has_one_discovery_port(tmp_path: Path) -> None:
+    assert count_participants(0, tmp_path / "udp") == 0  # without a list of ports
+    for_data, multicast, unrelated = (7411, 7413), (7400, 7401), (53, 68, 40000)
+    path = table(tmp_path, 7410, 7412, 7410, *for_data, *multicast, *unrelated)
+    assert count_participants(0, path) == 2
+    path = table(tmp_path, 7400 + 250 * 41 + 10, 7400 + 250 * 42 + 248, 7400 + 250 * 43)
+    assert [count_participants(domain_id, path) for domain_id in (40, 41, 42, 43)] == [0, 1, 1, 0]
+
+
+def test_only_udp_sockets_get_larger_buffers() -> None:
+    def sizes() -> list[int]:
+        return [item.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) for item in (udp, tcp)]
+
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
+        socket.socket(socket.AF_INET, socket.SOCK_STREAM) as tcp,
+    ):
+        before = sizes()
+        enlarge_receive_buffers()
+        assert sizes()[0] > before[0]
+        assert sizes()[1] == before[1]
