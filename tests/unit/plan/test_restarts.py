@@ -35,50 +35,35 @@ def test_restarts_are_due_in_the_order_of_their_times() -> None:
     assert desired.release("sensor").next_restart is None, "a requested transition came first"
 
 
-BUDGET = (
-    "{on_failure: restart,"
-    " restart: {max_attempts: 3, window_ms: 10000, backoff_ms: 100, then: shutdown}}"
-)
+BUDGET = "max_attempts: 3, window_ms: 10000, backoff_ms: 100, then: shutdown"
 
 
 @pytest.mark.parametrize(
-    ("restarts", "action", "wait_s", "attempt"),
+    ("budget", "restarts", "action", "wait_s", "attempt"),
     [
-        ((), OnFailure.RESTART, 0.1, 1),
-        ((95.0,), OnFailure.RESTART, 0.2, 2),
-        ((95.0, 96.0), OnFailure.RESTART, 0.4, 3),
-        ((95.0, 96.0, 97.0), OnFailure.SHUTDOWN, 0.0, 0),
-        ((80.0, 85.0, 89.9), OnFailure.RESTART, 0.1, 1),  # forgotten
-        ((80.0, 96.0, 97.0), OnFailure.RESTART, 0.4, 3),
+        (BUDGET, (), OnFailure.RESTART, 0.1, 1),
+        (BUDGET, (95.0,), OnFailure.RESTART, 0.2, 2),
+        (BUDGET, (95.0, 96.0), OnFailure.RESTART, 0.4, 3),
+        (BUDGET, (95.0, 96.0, 97.0), OnFailure.SHUTDOWN, 0.0, 0),
+        (BUDGET, (80.0, 85.0, 89.9), OnFailure.RESTART, 0.1, 1),  # forgotten
+        (BUDGET, (80.0, 96.0, 97.0), OnFailure.RESTART, 0.4, 3),
+        # a node without restarts left is given up alone unless "then" is shutdown
+        ("max_attempts: 1", (97.0,), OnFailure.ISOLATE, 0.0, 0),
+        ("max_attempts: 1, then: isolate", (97.0,), OnFailure.ISOLATE, 0.0, 0),
+        ("max_attempts: 1, then: shutdown", (97.0,), OnFailure.SHUTDOWN, 0.0, 0),
     ],
 )
 def test_the_budget(
-    restarts: tuple[float, ...], action: OnFailure, wait_s: float, attempt: int
+    budget: str, restarts: tuple[float, ...], action: OnFailure, wait_s: float, attempt: int
 ) -> None:
+    system = robot(f"{{on_failure: restart, restart: {{{budget}}}}}")
     desired = DesiredState(states("aaaaa"), restarts={"sensor": restarts})
-    decision = decide(robot(BUDGET), desired, fault("sensor"), NOW_S)
-    assert decision is not None
-    assert (decision.action, decision.wait_s, decision.attempt) == (action, wait_s, attempt)
-    if action is OnFailure.SHUTDOWN:
-        assert decision.reason == "silent for 300 ms; restarted 3 times within 10 s before"
-
-
-@pytest.mark.parametrize(
-    ("then", "action"),
-    [
-        ("", OnFailure.ISOLATE),
-        (", then: isolate", OnFailure.ISOLATE),
-        (", then: shutdown", OnFailure.SHUTDOWN),
-    ],
-)
-def test_a_node_without_restarts_left_is_given_up_alone_unless_then_is_shutdown(
-    then: str, action: OnFailure
-) -> None:
-    system = robot(f"{{on_failure: restart, restart: {{max_attempts: 1{then}}}}}")
-    desired = DesiredState(states("aaaaa"), restarts={"sensor": (97.0,)})
     decision = decide(system, desired, fault("sensor"), NOW_S)
     assert decision is not None
-    assert (decision.action, decision.condition) == (action, "given up")
+    assert (decision.action, decision.wait_s, decision.attempt) == (action, wait_s, attempt)
+    assert decision.condition == ("restarting" if attempt else "given up")
+    if budget == BUDGET and not attempt:
+        assert decision.reason == "silent for 300 ms; restarted 3 times within 10 s before"
 
 
 @pytest.mark.parametrize(

@@ -25,15 +25,11 @@ def test_goals_are_kept_until_the_system_is_shut_down(tmp_path: Path) -> None:
     goals.keep(BOTH, "running")
     goals.keep(BOTH, "paused")
     assert goals_of(path).read() == (BOTH, "paused")
+    gone = goals_of(path, "eye: {}, leg: {}")
+    assert gone.read() == ({"eye": INACTIVE}, "paused"), "nodes that are gone do not count"
     goals.forget()
     goals.forget()
     assert goals_of(path).read() is None
-
-
-def test_nodes_that_are_gone_do_not_count(tmp_path: Path) -> None:
-    path = tmp_path / "robot.goals"
-    goals_of(path).keep(BOTH, "running")
-    assert goals_of(path, "eye: {}, leg: {}").read() == ({"eye": INACTIVE}, "running")
 
 
 @pytest.mark.parametrize("text", ["", "{}", "\xff", '{"version": 0, "type": "x", "content": {}}'])

@@ -68,41 +68,40 @@ def serve() -> Iterator[Serve]:
         item.close(LIMIT_S)
 
 
-def test_a_view_arrives_unchanged(serve: Serve) -> None:
+def connected() -> socket.socket:
+    """Return a connection to the system /robot."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection.settimeout(LIMIT_S)
+    connection.connect(str(socket_path("/robot")))
+    return connection
+
+
+def test_a_view_arrives_unchanged_and_an_error_is_reported(serve: Serve) -> None:
     topics = tuple((f"/topic_{number}", ("std_msgs/msg/String",)) for number in range(20_000))
     views: list[GraphView | None] = [None, {**VIEW, "topic": topics}, VIEW, VIEW]
     served = iter(views)
-    serve(lambda: next(served))
-    assert [read_graph("/robot", LIMIT_S) for _ in views] == views
-    assert read_graph("/other", LIMIT_S) is None
-    assert visible_names(VIEW["node"]) == (("/a", ()),)
-
-
-def test_an_error_is_reported_and_the_next_command_served(
-    serve: Callable[..., list[Exception]],
-) -> None:
     problems = [ValueError("broken")]
 
-    def view() -> GraphView:
+    def view() -> GraphView | None:
         if problems:
             raise problems.pop()
-        return VIEW
+        return next(served)
 
     errors = serve(view)
     assert read_graph("/robot", LIMIT_S) is None
     assert [str(error) for error in errors] == ["broken"]
-    assert read_graph("/robot", LIMIT_S) == VIEW
+    assert [read_graph("/robot", LIMIT_S) for _ in views] == views
+    assert read_graph("/other", LIMIT_S) is None
+    assert visible_names(VIEW["node"]) == (("/a", ()),)
 
 
 UNKNOWN = f"{encode(NodesQuery())}\n".encode()
 
 
 @pytest.mark.parametrize("line", [b"", b"\n", b"[1, 2]\n", b"{}\n", UNKNOWN, b"\xff\n"])
-def test_an_unknown_query_has_no_answer(line: bytes, serve: Callable[..., list[Exception]]) -> None:
+def test_an_unknown_query_has_no_answer(line: bytes, serve: Serve) -> None:
     errors = serve(lambda: VIEW)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        connection.settimeout(LIMIT_S)
-        connection.connect(str(socket_path("/robot")))
+    with connected() as connection:
         connection.sendall(line)
         connection.shutdown(socket.SHUT_WR)
         assert connection.recv(1) == b""
@@ -112,7 +111,7 @@ def test_an_unknown_query_has_no_answer(line: bytes, serve: Callable[..., list[E
 
 
 def test_the_view_of_another_discovery_range_is_not_used(
-    serve: Callable[..., list[Exception]], monkeypatch: pytest.MonkeyPatch
+    serve: Serve, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     serve(lambda: VIEW)
     # Server and client share an environment here: each reads it once, the server first.
@@ -122,7 +121,7 @@ def test_the_view_of_another_discovery_range_is_not_used(
 
 
 def test_an_answer_of_another_version_is_not_used(
-    serve: Callable[..., list[Exception]], monkeypatch: pytest.MonkeyPatch
+    serve: Serve, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def of_next_version(value: Any) -> str:
         document = json.loads(encode(value))
@@ -139,7 +138,7 @@ def test_an_answer_of_another_version_is_not_used(
 
 
 def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
-    serve: Callable[..., list[Exception]],
+    serve: Serve,
 ) -> None:
     released = threading.Event()
     serve(lambda: VIEW if released.wait(LIMIT_S) else None)
@@ -150,7 +149,7 @@ def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
 
 
 def test_a_query_whose_command_has_given_up_is_skipped(
-    serve: Callable[..., list[Exception]],
+    serve: Serve,
 ) -> None:
     released, answered = threading.Event(), threading.Semaphore(0)
 
@@ -172,17 +171,14 @@ def test_a_query_whose_command_has_given_up_is_skipped(
     assert not answered.acquire(blocking=False)
 
 
-def test_a_slow_command_blocks_only_itself(serve: Callable[..., list[Exception]]) -> None:
+def test_a_slow_command_blocks_only_itself(serve: Serve) -> None:
     """Neither one that sends slowly nor one that does not read its answer."""
     before = set(threading.enumerate())
     topics = tuple((f"/topic_{number}", ()) for number in range(20_000))
     serve(lambda: {**VIEW, "topic": topics})
     with ExitStack() as stack:
         for sent in (b"[", f"{encode(GraphQuery())}\n".encode()) * 8:
-            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            stack.enter_context(connection)
-            connection.connect(str(socket_path("/robot")))
-            connection.sendall(sent)
+            stack.enter_context(connected()).sendall(sent)
         assert read_graph("/robot", LIMIT_S) is not None
     # Each ends within its limit, and with it its thread; a busy machine needs longer.
     end_s = time.monotonic() + 3 * LIMIT_S
@@ -202,9 +198,7 @@ def test_a_query_that_arrives_after_closing_ends() -> None:
         time.sleep(0.01)
         return [thread.name for thread in set(threading.enumerate()) - before]
 
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        connection.settimeout(LIMIT_S)
-        connection.connect(str(socket_path("/robot")))
+    with connected() as connection:
         while "query" not in threads():
             pass
         server.close(LIMIT_S)
@@ -215,11 +209,10 @@ def test_a_query_that_arrives_after_closing_ends() -> None:
 
 
 def test_a_command_that_sends_slowly_is_left_in_the_end(
-    serve: Callable[..., list[Exception]],
+    serve: Serve,
 ) -> None:
     serve(lambda: VIEW)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        connection.connect(str(socket_path("/robot")))
+    with connected() as connection:
         began_s = time.monotonic()
         connection.settimeout(0.1)
         while time.monotonic() < began_s + LIMIT_S:

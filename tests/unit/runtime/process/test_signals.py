@@ -1,10 +1,11 @@
-"""Signals end the wait of the main thread whenever they arrive; messages to the service manager."""
+"""Signals end the wait of the main thread whenever they arrive; how a process starts."""
 
 from __future__ import annotations
 
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -59,7 +60,25 @@ def test_messages_arrive_at_its_socket(
         service.send(READY, "STATUS=all nodes are up")
         assert service_manager.recv(1000) == b"READY=1\nSTATUS=all nodes are up"
     service.send(READY)  # it is gone
+    ServiceManager({}).send(READY)  # there is none
 
 
-def test_without_one_messages_go_nowhere() -> None:
-    ServiceManager({}).send(READY)
+CODE = """
+import os, sys, time
+from composer.runtime.process.computer import process_start_s
+if len(sys.argv) == 1:
+    os.execv(sys.executable, [sys.executable, __file__, "again"])
+print(process_start_s(), time.monotonic())
+"""
+
+
+def test_a_process_starts_once_although_python_starts_twice(tmp_path: Path) -> None:
+    script = tmp_path / "a (b) c.py"
+    script.write_text(CODE)
+    before_s = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, script], check=True, capture_output=True, text=True, timeout=100
+    )
+    start_s, end_s = map(float, done.stdout.split())
+    assert before_s - 0.02 <= start_s <= end_s
+    assert start_s - before_s < (end_s - before_s) / 2  # before Python has started once
