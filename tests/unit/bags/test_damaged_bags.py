@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import signal
 import sqlite3
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -22,6 +20,7 @@ from composer.bags.editing import Selection, write_bag
 from composer.bags.reader import open_bag
 from composer.bags.writer import BagWriter, SplitLimits
 from tests.unit.bags.test_form import read, write
+from tests.unit.support.waiting import wait_until
 
 _ENDLESS = """
 import sys, time
@@ -41,12 +40,13 @@ while True:
 def test_what_a_killed_process_has_written_can_be_read(tmp_path: Path) -> None:
     folder = tmp_path / "bag"
     with subprocess.Popen([sys.executable, "-c", _ENDLESS, str(folder)]) as process:
-        size = 0
-        until_s = time.monotonic() + 20.0
-        while size < 2000 and time.monotonic() < until_s:  # the first chunk, after a second
-            size = sum(path.stat().st_size for path in folder.glob("*.mcap"))
-            time.sleep(0.02)  # poll: nothing announces it
-        os.kill(process.pid, signal.SIGKILL)
+        try:
+            wait_until(
+                lambda: sum(path.stat().st_size for path in folder.glob("*.mcap")) > 2000,
+                "the first chunk, after a second",
+            )
+        finally:
+            process.kill()
     bag = open_bag(folder)
     numbers = [item.recorded_ns for item in read(bag)]
     assert len(numbers) > 10

@@ -10,9 +10,9 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 
-PATIENCE_S = 60.0
+from tests.unit.support.waiting import PATIENCE_S, is_alive, wait_until
+
 #: Prints its process id and that of a child, and how it is ended.
 COMMAND = """
 import os, signal, subprocess, sys
@@ -48,18 +48,7 @@ def pids(guard: subprocess.Popen[str]) -> list[int]:
 
 
 def wait_for_end(found: list[int]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while any(is_alive(pid) for pid in found):
-        assert time.monotonic() < end_s, "processes are left"
-        time.sleep(0.01)  # poll: these are not children of this process
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0]
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-    return state != "Z"
+    wait_until(lambda: not any(map(is_alive, found)), "the end of all")
 
 
 def test_the_end_of_the_input_ends_the_command_in_order() -> None:

@@ -10,8 +10,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -24,8 +24,8 @@ from composer.runtime.children.child_processes import (
     StartFailed,
 )
 from composer.runtime.executors.stacks import format_stack, stacks_of
+from tests.unit.support.waiting import PATIENCE_S, is_alive, status_of, wait_until
 
-PATIENCE_S = 60.0
 MARK = "COMPOSER_TEST_MARK"
 #: A composer with three children: a polite one, one that ignores everything but SIGKILL, and one
 #: with a grandchild that has left the process group.
@@ -46,26 +46,14 @@ time.sleep(60)
 """.replace("MARK", repr(MARK))
 
 
-def wait_until(condition: Callable[[], object], what: str) -> None:
-    """Wait until ``condition()`` is true; fail after ``PATIENCE_S``."""
-    began_s = time.monotonic()
-    while not condition():
-        assert time.monotonic() < began_s + PATIENCE_S, f"timed out: {what}"
-        time.sleep(0.002)
-
-
 def marked(mark: str) -> list[int]:
     """Return the processes with a mark in their environment."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            environment = (folder / "environ").read_bytes()
-            state = (folder / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
-        except OSError:
-            continue
-        if f"{MARK}={mark}\0".encode() in environment and state != "Z":
-            found.append(int(folder.name))
-    return found
+        with suppress(OSError):
+            if f"{MARK}={mark}\0".encode() in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+    return list(filter(is_alive, found))
 
 
 @pytest.fixture
@@ -101,8 +89,7 @@ def start(children: ChildProcesses, script: str, lines: list[tuple[str, bool]]) 
 
 def kill_launcher_of(child: int) -> int:
     """Kill the process that starts the children, the parent of a child; return its id."""
-    stat = Path("/proc", str(child), "stat").read_text(encoding="utf-8")
-    pid = int(stat.rpartition(")")[2].split()[1])
+    _, pid = status_of(child)
     os.kill(pid, signal.SIGKILL)
     return pid
 

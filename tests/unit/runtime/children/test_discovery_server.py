@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from composer.runtime.children.discovery_server import ServerRecord, has_work
+from tests.unit.support.waiting import wait_until
 
 IDENTITY = (0, "127.0.0.1", 11811)
 OTHER = (
@@ -64,17 +64,11 @@ def test_a_process_has_work_until_it_waits_or_has_ended() -> None:
     script = "read line; while [ ! -e /nowhere ]; do :; done"
     with subprocess.Popen(["/bin/sh", "-c", script], stdin=subprocess.PIPE) as process:
         try:
-            _until(process.pid, has_something_to_do=False)
+            wait_until(lambda: not has_work(process.pid), "its wait")
             assert process.stdin is not None
             process.stdin.write(b"\n")
             process.stdin.flush()
-            _until(process.pid, has_something_to_do=True)
+            wait_until(lambda: has_work(process.pid), "its work")
         finally:
             process.kill()
     assert not has_work(process.pid)
-
-
-def _until(pid: int, *, has_something_to_do: bool) -> None:
-    until_s = time.monotonic() + 20.0
-    while has_work(pid) is not has_something_to_do:
-        assert time.monotonic() < until_s

@@ -23,6 +23,7 @@ from composer.runtime.protocol.requests import (
     NodesQuery,
     visible_names,
 )
+from tests.unit.support.waiting import wait_until
 
 VIEW: GraphView = {
     "node": (("/a", ()), ("/_hidden", ())),
@@ -74,6 +75,11 @@ def connected() -> socket.socket:
     connection.settimeout(LIMIT_S)
     connection.connect(str(socket_path("/robot")))
     return connection
+
+
+def names_of_threads(before: set[threading.Thread]) -> list[str]:
+    """Return the names of the threads that have started since ``before``."""
+    return [thread.name for thread in set(threading.enumerate()) - before]
 
 
 def test_a_view_arrives_unchanged_and_an_error_is_reported(serve: Serve) -> None:
@@ -181,30 +187,18 @@ def test_a_slow_command_blocks_only_itself(serve: Serve) -> None:
             stack.enter_context(connected()).sendall(sent)
         assert read_graph("/robot", LIMIT_S) is not None
     # Each ends within its limit, and with it its thread; a busy machine needs longer.
-    end_s = time.monotonic() + 3 * LIMIT_S
-    while any(thread.name == "query" for thread in set(threading.enumerate()) - before):
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
+    wait_until(lambda: "query" not in names_of_threads(before), "all ends", 3 * LIMIT_S)
 
 
 def test_a_query_that_arrives_after_closing_ends() -> None:
     """Its thread was left for the rest of the process."""
     before = set(threading.enumerate())
     server = QuerySocket("/robot", {GraphQuery: lambda _: GraphAnswer(VIEW)}, lambda _: None)
-    end_s = time.monotonic() + LIMIT_S
-
-    def threads() -> list[str]:
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
-        return [thread.name for thread in set(threading.enumerate()) - before]
-
     with connected() as connection:
-        while "query" not in threads():
-            pass
+        wait_until(lambda: "query" in names_of_threads(before), "the query")
         server.close(LIMIT_S)
         connection.sendall(f"{encode(GraphQuery())}\n".encode())
-        while "query" in threads():
-            pass
+        wait_until(lambda: "query" not in names_of_threads(before), "the end of the query")
         assert connection.recv(1) == b""
 
 
