@@ -287,35 +287,28 @@ def test_an_argument_without_a_value_is_needed_to_run_only(tmp_path: Path) -> No
     assert chosen(path, "mode=fast", "name=12") == ["n12"]
 
 
-def test_of_too_many_combinations_each_value_is_checked(tmp_path: Path) -> None:
-    names = [f"option_{number}" for number in range(7)]
-    text = "\n".join(
-        [
-            "system: s",
-            "arguments:",
-            *(f"  {name}: false" for name in names),
-            "nodes:",
-            *(f"  {name}: {{if: {name}, executor: fast}}" for name in names),
-            "  other: {on_activate: {log: started}}",
-        ]
-    )
-    first, *others = messages_in(tmp_path, text)
-    assert first.startswith("too-large: the arguments have 128 combinations, more than 64")
-    assert len(others) == len(names)
-    assert all(f"(with {name}=true)" in text for name, text in zip(names, others, strict=True))
-
-
-def test_of_a_large_system_fewer_combinations_are_checked(tmp_path: Path) -> None:
-    many = "".join(
-        f"  n{number}: {{unless: a, on_activate: {{log: x}}}}\n" for number in range(2400)
-    )
-    names = "abcdef"
-    arguments = "".join(f"  {name}: false\n" for name in names)
-    wrong = "".join(f"  {name}: {{if: {name}, executor: fast}}\n" for name in names)
-    text = f"system: s\narguments:\n{arguments}nodes:\n{wrong}{many}"
-    first, *others = messages_in(tmp_path, text)
-    assert first.startswith("too-large: the arguments have 64 combinations, too many for a system")
-    assert 0 < len(others) < len(names)
+@pytest.mark.parametrize(
+    ("options", "others", "limit"),
+    [
+        (7, 1, "128 combinations, more than 64"),  # each value is checked
+        (6, 2400, "64 combinations, too many for a system"),  # fewer combinations are checked
+    ],
+)
+def test_of_too_many_combinations_some_are_checked(
+    tmp_path: Path, options: int, others: int, limit: str
+) -> None:
+    names = [f"option_{number}" for number in range(options)]
+    other = "  n#: {unless: option_0, on_activate: {log: x}}\n"
+    text = "system: s\narguments:\n" + "".join(f"  {name}: false\n" for name in names) + "nodes:\n"
+    text += "".join(f"  {name}: {{if: {name}, executor: fast}}\n" for name in names)
+    text += "".join(other.replace("#", str(number)) for number in range(others))
+    first, *found = messages_in(tmp_path, text)
+    assert first.startswith(f"too-large: the arguments have {limit}")
+    if options == 7:
+        pairs = zip(names, found, strict=True)
+        assert all(f"(with {name}=true)" in message for name, message in pairs)
+    else:
+        assert 0 < len(found) < len(names)
 
 
 CONDITIONS = (

@@ -60,12 +60,17 @@ def test_the_latest_time_is_that_of_all_transforms_on_the_way(buffer: TransformB
     assert buffer.lookup("map", "map", None) == Found(0, IDENTITY)
 
 
-def test_transforms_are_interpolated(buffer: TransformBuffer) -> None:
+def test_transforms_are_interpolated_on_the_way_to_the_common_ancestor(
+    buffer: TransformBuffer,
+) -> None:
     assert x_of(buffer.lookup("map", "odom", int(2.5 * S))) == pytest.approx(1.5)
     assert x_of(buffer.lookup("map", "odom", 3 * S)) == 2.0
     assert x_of(buffer.lookup("odom", "map", int(1.5 * S))) == pytest.approx(-0.5)
     rotation = buffer.lookup("odom", "laser", 3 * S).transform.rotation
     assert rotation == pytest.approx(quaternion_of_angles(0.0, 0.0, math.pi / 4))
+    buffer.insert("base_link", "wheel", 0, at(-0.5), static=True)
+    assert x_of(buffer.lookup("laser", "wheel", 99 * S)) == pytest.approx(-1.0)
+    assert x_of(buffer.lookup("odom", "base_link", 4 * S)) == 1.0  # later than what odom has
 
 
 def message_of(kind: type[TransformError], call: object) -> str:
@@ -102,12 +107,6 @@ def test_errors_name_the_frames_and_the_times(buffer: TransformBuffer) -> None:
     empty.insert("map", "odom", S, at(1.0), static=False)
     text = message_of(TransformExtrapolationError, lambda: empty.lookup("map", "odom", 2 * S))
     assert "is known only at 1.000 s, and the time is later" in text
-
-
-def test_a_lookup_needs_only_the_way_to_the_common_ancestor(buffer: TransformBuffer) -> None:
-    buffer.insert("base_link", "wheel", 0, at(-0.5), static=True)
-    assert x_of(buffer.lookup("laser", "wheel", 99 * S)) == pytest.approx(-1.0)
-    assert x_of(buffer.lookup("odom", "base_link", 4 * S)) == 1.0  # later than what odom has
 
 
 def test_ten_seconds_are_kept(buffer: TransformBuffer) -> None:
