@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from composer.runtime.executors.futures import Cancelled, Future, awaited_rclpy_future
+from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.tasks import Task, sleep, within
 
 
@@ -190,12 +190,6 @@ class TestTask:
         loop.task(step("b"))
         loop.run()
         assert seen == ["a0", "b0", "a1", "b1"]
-
-    def test_only_an_rclpy_future_is_taken_for_one(self) -> None:
-        nap = asyncio.sleep(0)
-        nap.send(None)
-        assert awaited_rclpy_future(nap) is None
-        nap.close()
 
     def test_a_wrong_await_raises_and_the_coroutine_may_continue(self, loop: Loop) -> None:
         class Wrong:
