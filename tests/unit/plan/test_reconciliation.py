@@ -159,19 +159,3 @@ def test_a_second_fault_of_a_failed_node_is_ignored() -> None:
     assert decide(robot(), desired, fault("sensor"), NOW_S) is None
     assert decide(robot(), desired, fault("camera"), NOW_S) is not None
     assert decide(robot(), desired, fault("missing"), NOW_S) is None
-
-
-def test_two_nodes_that_fail_one_after_the_other_come_back_one_after_the_other() -> None:
-    system = robot()
-    desired = DesiredState(states("aaaaa")).fail(fault("sensor")).fail(fault("planner"))
-    down = reconcile(system, desired, states("aaaaa"), "")
-    assert steps(down) == [
-        *(f"deactivate {name}" for name in ("motor", "logger", "planner", "sensor")),
-        *("cleanup planner", "cleanup sensor"),
-    ]
-    desired = desired.restart("planner", 101.0)
-    up = reconcile(system, desired, states("uuiia"), "restart")
-    assert steps(up) == ["configure planner", "activate logger"]
-    desired = desired.restart("sensor", 102.0)
-    up = reconcile(system, desired, states("uiiaa"), "restart")
-    assert steps(up)[:2] == ["configure sensor", "activate sensor"]
