@@ -1,47 +1,44 @@
-"""Which addresses, users and workspaces of hosts can be used."""
+"""Addresses, users, workspaces and domains of hosts, and the discovery of a system."""
 
 from __future__ import annotations
 
-import pytest
+from pathlib import Path
 
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from composer.model import member_system
 from composer.model.hosts import (
     address_problem,
     domain_problem,
+    interface_problem,
+    is_loopback,
     key_file_problem,
     name_problem,
+    peer_problem,
+    server_problem,
     user_problem,
     workspace_problem,
 )
-
-
-@pytest.mark.parametrize("text", ["~/robot", "/opt/robot", "/home/pilot/robot", "~/ws/robot"])
-def test_workspaces(text: str) -> None:
-    assert workspace_problem(text) is None
+from tests.unit.support.checking import valid_system
 
 
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("", "neither"),
-        (".", "neither"),
-        ("robot", "neither"),
-        ("~pilot/robot", "neither"),
-        ("/", "root"),
-        ("//", "root"),
-        ("~", "home folder"),
-        ("~/", "home folder"),
-        ("~/.", "home folder"),
-        ("/home/pilot", "home folder"),
-        ("/home/pilot/", "home folder"),
+        *((text, None) for text in ("~/robot", "/opt/robot", "/home/pilot/robot", "~/ws/robot")),
+        *((text, "neither") for text in ("", ".", "robot", "~pilot/robot")),
+        *((text, "root") for text in ("/", "//")),
+        *((text, "home folder") for text in ("~", "~/", "~/.", "/home/pilot", "/home/pilot/")),
         ("/usr", "operating system"),
         ("/opt/../etc", ".."),
         ("~/a\nb", "control"),
     ],
 )
-def test_unsafe_workspaces(text: str, part: str) -> None:
+def test_workspaces(text: str, part: str | None) -> None:
     problem = workspace_problem(text)
-    assert problem is not None
-    assert part in problem
+    assert problem is None if part is None else part in problem
 
 
 PROBLEMS = {
@@ -52,45 +49,118 @@ PROBLEMS = {
 }
 
 
+BAD_WORDS = ("", "-oProxyCommand=x", "a b", "a\n", "me@there", "a'b")
+BAD_WORDS += ("x/y", "..", "%n", "$(x)", "a;b")
+
+
 @pytest.mark.parametrize(
-    ("what", "texts"),
+    ("what", "valid", "invalid"),
     [
-        ("name", ("jetson", "Arm-2", "7", "a" * 63)),
-        ("address", ("robot", "10.0.0.5", "::1", "fe80::1%eth0", "jetson.local", "arm_1")),
-        ("user", ("robot", "a.b", "_ros-2", "müller")),
-        ("file", ("~/.ssh/id", "keys/my %h key", "it's", "..id")),
+        (
+            "name",
+            ("jetson", "Arm-2", "7", "a" * 63),
+            (*BAD_WORDS, "a.b", "a_b", "a-", "a" * 64, "müller"),
+        ),
+        (
+            "address",
+            ("robot", "10.0.0.5", "::1", "fe80::1%eth0", "jetson.local", "arm_1"),
+            (*BAD_WORDS, "999.1.1.1", f"{'9' * 5000}.1.1.1", "fe80::1%a b", "a:b"),
+        ),
+        ("user", ("robot", "a.b", "_ros-2", "müller"), BAD_WORDS),
+        (
+            "file",
+            ("~/.ssh/id", "keys/my %h key", "it's", "..id"),
+            ('a"b', "a\nb", "a\\b", "${HOME}/id"),
+        ),
     ],
 )
-def test_words_that_can_be_used(what: str, texts: tuple[str, ...]) -> None:
-    assert [text for text in texts if PROBLEMS[what](text) is not None] == []
+def test_words(what: str, valid: tuple[str, ...], invalid: tuple[str, ...]) -> None:
+    assert [text for text in valid if PROBLEMS[what](text) is not None] == []
+    assert [text for text in invalid if PROBLEMS[what](text) is None] == []
 
 
-@pytest.mark.parametrize("what", ["name", "address", "user"])
+def test_domains() -> None:
+    for text in ("", "0", "7", "007", "101", "232", "0" * 5000):
+        assert domain_problem(text) is None, text
+    for text in ("233", "700", "-1", "1.5", " 7", "seven", "²", "9" * 5000):
+        assert domain_problem(text) == "is not a number from 0 to 232", text
+
+
+NODES = "nodes: {arm: {process: acting, on_activate: {log: on}}}\nprocesses: {acting: {}}\n"
+SERVER = {"ROS_DISCOVERY_SERVER": "10.0.0.1:11811", "ROS_SUPER_CLIENT": "TRUE"}
+
+
 @pytest.mark.parametrize(
-    "text",
-    ["", "-oProxyCommand=x", "a b", "a\n", "me@there", "a'b", "x/y", "..", "%n", "$(x)", "a;b"],
-)
-def test_words_that_cannot_be_used(what: str, text: str) -> None:
-    assert PROBLEMS[what](text) is not None
-
-
-@pytest.mark.parametrize(
-    ("what", "text"),
+    ("text", "variables"),
     [
-        *(("name", text) for text in ("a.b", "a_b", "a-", "a" * 64, "müller")),
-        *(("address", text) for text in ("999.1.1.1", f"{'9' * 5000}.1.1.1", "fe80::1%a b", "a:b")),
-        *(("file", text) for text in ('a"b', "a\nb", "a\\b", "${HOME}/id")),
+        ("{kind: multicast, interfaces: [eth0]}", {}),
+        ("{kind: server, address: 10.0.0.1}", SERVER),
+        (
+            '{kind: server, address: [10.0.0.1, "jetson:7"], port: 4000}',
+            SERVER | {"ROS_DISCOVERY_SERVER": "10.0.0.1:4000;jetson:7"},
+        ),
+        # Only the coordinating process starts the server.
+        ("{kind: server, address: 10.0.0.1, start: true}", SERVER),
+        # Variables of the file are inserted.
+        ("{kind: server, address: '${at}', port: '${port}'}", SERVER),
+        (
+            "{kind: peers, peers: [10.0.0.1, jetson.local]}",
+            {
+                "ROS_STATIC_PEERS": "10.0.0.1;jetson.local",
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            },
+        ),
     ],
 )
-def test_other_words_that_cannot_be_used(what: str, text: str) -> None:
-    assert PROBLEMS[what](text) is not None
+def test_a_discovery_is_expressed_by_variables_of_ros(
+    text: str, variables: dict[str, str], tmp_path: Path
+) -> None:
+    arguments = "arguments: {at: 10.0.0.1, port: 11811}\n" if "${" in text else ""
+    whole = f"system: robot\n{arguments}discovery: {text}\n{NODES}"
+    system = valid_system(tmp_path, {"robot.yaml": whole})
+    member = member_system(system, "acting")
+    assert system.discovery.variables == member.discovery.variables == variables
+    assert (system.discovery.start, member.discovery.start) == ("start: true" in text, False)
 
 
-@pytest.mark.parametrize("text", ["", "0", "7", "007", "101", "232", "0" * 5000])
-def test_domains_that_ros_accepts(text: str) -> None:
-    assert domain_problem(text) is None
+@pytest.mark.parametrize(
+    ("problem", "addresses"),
+    [
+        (None, ("10.0.0.1", "10.0.0.1:11811", "jetson-1.local:65535", "robot_1")),
+        (
+            "has no valid port",
+            ("10.0.0.1:", "10.0.0.1:0", "10.0.0.1:65536", "10.0.0.1:\u0661"),
+        ),
+        ("is not an IPv4 address", ("10.0.0:11811", "10.0..1", "10.0.0.256")),
+        ("is not the address of a computer", ("0.0.0.0", "239.255.0.1")),
+        ("is an IPv6 address", ("::1", "[::1]:11811")),
+        (
+            "is neither an IPv4 address nor a host name",
+            ("", ":11811", "my robot", "robot;10.0.0.1", "-robot"),
+        ),
+    ],
+)
+def test_addresses_of_servers(problem: str | None, addresses: tuple[str, ...]) -> None:
+    for address in addresses:
+        found = server_problem(address)
+        assert (found or "").startswith(problem or ""), address
+        assert (found is None) is (problem is None), address
 
 
-@pytest.mark.parametrize("text", ["233", "700", "-1", "1.5", " 7", "seven", "²", "9" * 5000])
-def test_domains_that_ros_refuses(text: str) -> None:
-    assert domain_problem(text) == "is not a number from 0 to 232"
+def test_peers_have_no_port_and_interfaces_no_path() -> None:
+    assert peer_problem("10.0.0.1:7400") == "has a port, which peers do not have"
+    names = ("eth0", "10.0.0.1", "10.0.0", "a/b", "sixteen_letters_")
+    assert [name for name in names if interface_problem(name) is None] == ["eth0", "10.0.0.1"]
+
+
+@given(st.text(max_size=300))
+def test_what_is_valid_is_one_entry_of_a_list(text: str) -> None:
+    for find_problem in (server_problem, peer_problem, interface_problem):
+        if find_problem(text) is None:
+            assert text
+            assert not set(text) & set(";'\"<&\n ")
+
+
+def test_loopback_addresses() -> None:
+    assert all(map(is_loopback, ("localhost", "127.0.0.1", "127.1.2.3")))
+    assert not any(map(is_loopback, ("10.0.0.1", "jetson", "127.example.org")))

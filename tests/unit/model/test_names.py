@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from composer.model.names import (
@@ -16,85 +18,57 @@ from composer.model.names import (
 )
 
 LETTER = "letters, digits and '_' are allowed"
+#: By check: names and what is wrong with them.
+PROBLEMS: dict[Callable[[str], str | None], dict[str, str | None]] = {
+    node_name_problem: {
+        **dict.fromkeys(("planner", "_planner2", "a__b", "a" * 255)),
+        "": "is empty",
+        "2nd": "begins with a digit",
+        "a/b": f"contains '/'; {LETTER}",
+        "my node": f"contains a space; {LETTER}",
+        "nöde": f"contains 'ö'; {LETTER}",
+        "a\x1b": f"contains U+001B; {LETTER}",
+        "a" * 256: "has 256 characters, more than 255",
+    },
+    namespace_problem: {
+        **dict.fromkeys(("/", "/robot1", "robot1/arm", "/" + "a" * 244)),
+        "": "is empty",
+        "/robot1/": "ends with '/'",
+        "//robot1": "has an empty part between slashes",
+        "~/robot1": "begins with '~', which has no meaning in a namespace",
+        "/1robot": "has a part that begins with a digit: '1robot'",
+        "/a__b": "contains '__'",
+        "/" + "a" * 245: "has 246 characters, more than 245",
+    },
+    topic_name_problem: {
+        **dict.fromkeys(("scan", "/perception/scan", "~/scan", "~", "_hidden")),
+        "": "is empty",
+        "/": "ends with '/'",
+        "~/": "ends with '/'",
+        "~scan": "has no '/' after '~'",
+        "a/~": f"contains '~'; {LETTER}",
+        "a//b": "has an empty part between slashes",
+        "a/2b": "has a part that begins with a digit: '2b'",
+        "a__b": "contains '__'",
+        "{node}/scan": f"contains '{{'; {LETTER}",
+        "a" * 248: "has 248 characters, more than 247",
+    },
+    parameter_name_problem: {
+        **dict.fromkeys(("max_velocity", "camera.fps")),
+        "": "is empty",
+        "camera..fps": "has an empty part between dots",
+        "camera.2": "has a part that begins with a digit: '2'",
+        "max-velocity": f"contains '-'; {LETTER}",
+    },
+}
 
 
 @pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("planner", None),
-        ("_planner2", None),
-        ("a__b", None),
-        ("a" * 255, None),
-        ("", "is empty"),
-        ("2nd", "begins with a digit"),
-        ("a/b", f"contains '/'; {LETTER}"),
-        ("my node", f"contains a space; {LETTER}"),
-        ("nöde", f"contains 'ö'; {LETTER}"),
-        ("a\x1b", f"contains U+001B; {LETTER}"),
-        ("a" * 256, "has 256 characters, more than 255"),
-    ],
+    ("check", "name", "problem"),
+    [(check, *case) for check, cases in PROBLEMS.items() for case in cases.items()],
 )
-def test_node_name(name: str, problem: str | None) -> None:
-    assert node_name_problem(name) == problem
-
-
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("/", None),
-        ("/robot1", None),
-        ("robot1/arm", None),
-        ("/" + "a" * 244, None),
-        ("", "is empty"),
-        ("/robot1/", "ends with '/'"),
-        ("//robot1", "has an empty part between slashes"),
-        ("~/robot1", "begins with '~', which has no meaning in a namespace"),
-        ("/1robot", "has a part that begins with a digit: '1robot'"),
-        ("/a__b", "contains '__'"),
-        ("/" + "a" * 245, "has 246 characters, more than 245"),
-    ],
-)
-def test_namespace(name: str, problem: str | None) -> None:
-    assert namespace_problem(name) == problem
-
-
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("scan", None),
-        ("/perception/scan", None),
-        ("~/scan", None),
-        ("~", None),
-        ("_hidden", None),
-        ("", "is empty"),
-        ("/", "ends with '/'"),
-        ("~/", "ends with '/'"),
-        ("~scan", "has no '/' after '~'"),
-        ("a/~", f"contains '~'; {LETTER}"),
-        ("a//b", "has an empty part between slashes"),
-        ("a/2b", "has a part that begins with a digit: '2b'"),
-        ("a__b", "contains '__'"),
-        ("{node}/scan", f"contains '{{'; {LETTER}"),
-        ("a" * 248, "has 248 characters, more than 247"),
-    ],
-)
-def test_topic_name(name: str, problem: str | None) -> None:
-    assert topic_name_problem(name) == problem
-
-
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("max_velocity", None),
-        ("camera.fps", None),
-        ("", "is empty"),
-        ("camera..fps", "has an empty part between dots"),
-        ("camera.2", "has a part that begins with a digit: '2'"),
-        ("max-velocity", f"contains '-'; {LETTER}"),
-    ],
-)
-def test_parameter_name(name: str, problem: str | None) -> None:
-    assert parameter_name_problem(name) == problem
+def test_problems(check: Callable[[str], str | None], name: str, problem: str | None) -> None:
+    assert check(name) == problem
 
 
 @pytest.mark.parametrize(
@@ -128,11 +102,9 @@ def test_joining(namespace: str, relative: str, joined: str) -> None:
     assert join(namespace, relative) == joined
 
 
-@pytest.mark.parametrize(
-    ("name", "hidden"), [("/a/_b", True), ("_a", True), ("/a/b_", False), ("/", False)]
-)
-def test_hidden(name: str, hidden: bool) -> None:
-    assert is_hidden(name) is hidden
+def test_hidden_names() -> None:
+    names = ("/a/_b", "_a", "/a/b_", "/")
+    assert [is_hidden(name) for name in names] == [True, True, False, False]
 
 
 @pytest.mark.parametrize(

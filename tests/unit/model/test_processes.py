@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import load
 from composer.model import OnFailure, PrimaryState, System, member_system
+from tests.unit.support.checking import valid_system
 
 TEXT = """
 system: robot
@@ -27,19 +27,11 @@ nodes:
 
 @pytest.fixture
 def system(tmp_path: Path) -> System:
-    path = tmp_path / "robot.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    result = load(path)
-    assert result.system is not None
-    assert not result.diagnostics
-    return result.system
+    return valid_system(tmp_path, {"robot.yaml": TEXT})
 
 
 def test_nodes_have_processes_by_name_pattern_and_key(system: System) -> None:
-    processes = {
-        node.name.value: None if node.process is None else node.process.value
-        for node in system.nodes
-    }
+    processes = {node.name.value: node.process and node.process.value for node in system.nodes}
     assert processes == {
         "camera_front": "vision",
         "camera_rear": "vision",
@@ -47,29 +39,22 @@ def test_nodes_have_processes_by_name_pattern_and_key(system: System) -> None:
         "logger": None,
     }
     vision = system.processes[0]
-    assert vision.cpus == (1, 2)
+    assert (vision.cpus, vision.memory_mb.value, vision.host.value) == ((1, 2), 200, "jetson")
     assert [(name.value, value) for name, value in vision.environment] == [("SIZE", "3")]
-    assert vision.memory_mb is not None
-    assert vision.memory_mb.value == 200
-    assert vision.host is not None
-    assert vision.host.value == "jetson"
     assert system.hosts[0].login == "pilot@10.0.0.5"
     assert system.hosts[0].setup == ("env.sh",)
 
 
-def test_a_process_only_takes_failed_nodes_down(system: System) -> None:
-    member = member_system(system, "vision")
+def test_a_process_only_takes_failed_nodes_down_and_knows_how_far_nodes_start(
+    system: System,
+) -> None:
+    member = member_system(system, "vision", {"camera_front": PrimaryState.INACTIVE})
     assert member.name.value == "robot/vision"
     assert [node.full_name for node in member.nodes] == ["/lab/camera_front", "/lab/camera_rear"]
     for node in member.nodes:
         assert node.in_process
         assert not node.depends_on
         assert node.supervision.policy is OnFailure.ISOLATE
-
-
-def test_a_process_knows_how_far_its_nodes_start(system: System) -> None:
-    member = member_system(system, "vision", {"camera_front": PrimaryState.INACTIVE})
     front, rear = member.nodes
-    assert front.autostart is not None
     assert front.autostart.value is PrimaryState.INACTIVE
     assert rear.autostart is None

@@ -34,41 +34,37 @@ STRONG = QosProfile(
 def test_a_strong_offer_meets_every_request() -> None:
     assert incompatibilities(STRONG, WEAK) == ()
     assert incompatibilities(STRONG, STRONG) == ()
+    for profile in PRESETS.values():
+        assert incompatibilities(profile, profile) == ()
+    # History, depth and lifespan never matter.
+    odd = replace(WEAK, history=History.KEEP_ALL, depth=1, lifespan_ms=1.0)
+    assert incompatibilities(odd, WEAK) == incompatibilities(WEAK, odd) == ()
+
+
+#: Policies as they are named in YAML; what is offered and requested; the consequence.
+TOO_WEAK = (
+    ("reliability", "best_effort", "reliable", "does not send lost messages again"),
+    ("durability", "volatile", "transient_local", "does not keep messages for late joiners"),
+    ("deadline_ms", "no limit", "10 ms",
+     "offers a longer deadline than the subscription requests"),
+    ("liveliness", "automatic", "manual_by_topic", "does not assert its liveliness manually"),
+    ("liveliness_lease_duration_ms", "no limit", "100 ms",
+     "may be silent for longer than the subscription allows"),
+)  # fmt: skip
 
 
 def test_every_policy_that_is_too_weak_is_named() -> None:
-    assert incompatibilities(WEAK, STRONG) == (
-        Incompatibility(
-            "reliability",
-            "best_effort",
-            "reliable",
-            "the publisher does not send lost messages again",
-        ),
-        Incompatibility(
-            "durability",
-            "volatile",
-            "transient_local",
-            "the publisher does not keep messages for late joiners",
-        ),
-        Incompatibility(
-            "deadline_ms",
-            "no limit",
-            "10 ms",
-            "the publisher offers a longer deadline than the subscription requests",
-        ),
-        Incompatibility(
-            "liveliness",
-            "automatic",
-            "manual_by_topic",
-            "the publisher does not assert its liveliness manually",
-        ),
-        Incompatibility(
-            "liveliness_lease_duration_ms",
-            "no limit",
-            "100 ms",
-            "the publisher may be silent for longer than the subscription allows",
-        ),
+    assert incompatibilities(WEAK, STRONG) == tuple(
+        Incompatibility(*case, f"the publisher {consequence}") for *case, consequence in TOO_WEAK
     )
+    assert {name for name, *_ in TOO_WEAK} <= {policy.name for policy in fields(QosProfile)}
+
+
+def test_the_three_patterns() -> None:
+    sensor_data, command, state = (PRESETS[name] for name in ("sensor_data", "command", "state"))
+    assert (sensor_data.reliability, sensor_data.depth) == (Reliability.BEST_EFFORT, 5)
+    assert (command.reliability, command.depth) == (Reliability.RELIABLE, 10)
+    assert (state.durability, state.depth) == (Durability.TRANSIENT_LOCAL, 1)
 
 
 @pytest.mark.parametrize("policy", ["deadline_ms", "liveliness_lease_duration_ms"])
@@ -83,26 +79,3 @@ def test_a_period_offered_must_not_be_longer(
         replace(WEAK, **{policy: offered}), replace(WEAK, **{policy: requested})
     )
     assert [item.policy for item in found] == ([] if fits else [policy])
-
-
-def test_history_depth_and_lifespan_never_matter() -> None:
-    odd = replace(WEAK, history=History.KEEP_ALL, depth=1, lifespan_ms=1.0)
-    assert incompatibilities(odd, WEAK) == incompatibilities(WEAK, odd) == ()
-
-
-def test_the_three_patterns() -> None:
-    sensor_data, command, state = (PRESETS[name] for name in ("sensor_data", "command", "state"))
-    assert (sensor_data.reliability, sensor_data.depth) == (Reliability.BEST_EFFORT, 5)
-    assert (command.reliability, command.depth) == (Reliability.RELIABLE, 10)
-    assert (state.durability, state.depth) == (Durability.TRANSIENT_LOCAL, 1)
-
-
-@pytest.mark.parametrize("name", PRESETS)
-def test_a_preset_is_compatible_with_itself(name: str) -> None:
-    assert incompatibilities(PRESETS[name], PRESETS[name]) == ()
-
-
-def test_policies_are_named_as_in_yaml() -> None:
-    assert {item.policy for item in incompatibilities(WEAK, STRONG)} <= {
-        policy.name for policy in fields(QosProfile)
-    }

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from composer.base.diagnostics import Diagnostic
-from composer.loading import load_bytes, load_files
+from composer.loading import load, load_bytes, load_files
+from composer.loading.reported import LoadResult
+from composer.model import System
 
 #: The module of a node.
 _MODULE = re.compile(r"""(?:class|behavior): ['"]?(\w+)(?=:)""")
@@ -18,6 +21,25 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+
+
+def load_project(folder: Path, files: Mapping[str, str], **options: Any) -> LoadResult:
+    """Write the files and load the first one, with the options of ``load``."""
+    write_files(folder, files)
+    return load(folder / next(iter(files)), **options)
+
+
+def valid_system(folder: Path, files: Mapping[str, str], **options: Any) -> System:
+    """Load a system that has nothing wrong in it from the first of the files."""
+    result = load_project(folder, files, **options)
+    assert [f"{item.primary}: {item.message}" for item in result.diagnostics] == []
+    assert result.system is not None
+    return result.system
+
+
+def places(diagnostics: Iterable[Diagnostic]) -> list[str]:
+    """Return where each diagnostic is and the name of its rule, as ``file:line:column rule``."""
+    return [f"{item.primary} {item.rule.name}" for item in diagnostics]
 
 
 def diagnostics_of_each(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from composer.base.diagnostics import Diagnostic
 from composer.loading import load, load_files
 from composer.loading.reported import LoadResult, collect_diagnostics
 from composer.model import System
+from tests.unit.support.checking import load_project, places, write_files
 
 CAMERA = """\
 system: camera
@@ -35,37 +37,30 @@ chains:
 """
 
 
-def project(folder: Path, **files: str) -> Path:
-    """Write files, ``__`` in a name being a folder's end, and return the first."""
-    paths = []
-    for name, text in files.items():
-        path = folder / f"{name.replace('__', '/')}.yaml"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-        paths.append(path)
-    return paths[0]
+def included(
+    folder: Path, include: str, rest: str = "", files: Mapping[str, str] | None = None
+) -> LoadResult:
+    whole = f"system: whole\ninclude:\n  - {include}\n{rest}"
+    all_files = {"whole.yaml": whole, "camera.yaml": CAMERA, **(files or {})}
+    return load_project(folder, all_files, shown="whole.yaml")
 
 
-def included(folder: Path, include: str, rest: str = "", **files: str) -> LoadResult:
-    text = f"system: whole\ninclude:\n  - {include}\n{rest}"
-    path = project(folder, **{"whole": text, "camera": CAMERA, **files})
-    return load(path, shown="whole.yaml")
+def reported(diagnostics: list[Diagnostic]) -> list[str]:
+    return [line for line in places(diagnostics) if not line.endswith("impossible-chain")]
+
+
+def together(*names: str) -> list[str]:
+    """Return what is reported about files of the current folder that are checked together."""
+    return reported(collect_diagnostics(load_files([Path(name) for name in names])))
 
 
 def system_of(loading: LoadResult) -> System:
-    assert [
-        f"{item.primary}: {item.message}"
-        for item in loading.diagnostics
-        if item.rule.name not in QUIET
-    ] == []
+    assert reported(loading.diagnostics) == []
     assert loading.system is not None
     return loading.system
 
 
-QUIET = {"impossible-chain"}
-
-
-def test_wildcards_of_a_parameter_file_apply_to_its_nodes_only(tmp_path: Path) -> None:
+def test_sections_for_all_nodes_apply_to_the_nodes_of_their_file_only(tmp_path: Path) -> None:
     rest = "nodes: {operator: {on_activate: {log: started}}}\n"
     system = system_of(included(tmp_path, "camera.yaml", rest))
     found = {
@@ -85,23 +80,18 @@ def test_wildcards_of_a_parameter_file_apply_to_its_nodes_only(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("include", "whole", "full_names", "topic"),
+    ("include", "whole", "namespace", "topic"),
     [
-        ("{file: camera.yaml, namespace: left}", "", ["/left/driver", "/left/screen/viewer"],
-         "/left/image"),
-        ("{file: camera.yaml, namespace: /left}", "namespace: robot\n",
-         ["/left/driver", "/left/screen/viewer"], "/left/image"),
-        ("{file: camera.yaml, namespace: left}", "namespace: robot\n",
-         ["/robot/left/driver", "/robot/left/screen/viewer"], "/robot/left/image"),
-        ("{file: camera.yaml, prefix: left_}", "", ["/left_driver", "/screen/left_viewer"],
-         "/image"),
-        ("{file: camera.yaml, namespace: left, arguments: {topic: /image}}", "",
-         ["/left/driver", "/left/screen/viewer"], "/image"),
+        ("namespace: left", "", "/left", "/left/image"),
+        ("namespace: /left", "namespace: robot\n", "/left", "/left/image"),
+        ("namespace: left", "namespace: robot\n", "/robot/left", "/robot/left/image"),
+        ("namespace: left, arguments: {topic: /image}", "", "/left", "/image"),
     ],
-)  # fmt: skip
-def test_names(tmp_path: Path, include: str, whole: str, full_names: list[str], topic: str) -> None:
-    system = system_of(included(tmp_path, include, whole))
-    assert [node.full_name for node in system.nodes] == full_names
+)
+def test_names(tmp_path: Path, include: str, whole: str, namespace: str, topic: str) -> None:
+    system = system_of(included(tmp_path, f"{{file: camera.yaml, {include}}}", whole))
+    full_names = [node.full_name for node in system.nodes]
+    assert full_names == [f"{namespace}/driver", f"{namespace}/screen/viewer"]
     assert {port.full_name for node in system.nodes for port in node.ports} == {topic}
 
 
@@ -122,10 +112,8 @@ nodes:
 connections:
   - {topic: left/image, to: referee.images}
 """
-    loading = included(
-        tmp_path, "{file: parts/pair.yaml, prefix: first_, namespace: /}", parts__pair=pair
-    )
-    system = system_of(loading)
+    include = "{file: parts/pair.yaml, prefix: first_, namespace: /}"
+    system = system_of(included(tmp_path, include, files={"parts/pair.yaml": pair}))
     assert [node.full_name for node in system.nodes] == [
         "/pair/left/first_left_driver",
         "/pair/left/screen/first_left_viewer",
@@ -134,19 +122,9 @@ connections:
         "/pair/first_referee",
     ]
     referee = system.nodes[-1]
-    assert [str(item.node) for item in referee.depends_on] == [
-        "first_left_viewer",
-        "first_right_viewer",
-    ]
+    needed = [str(item.node) for item in referee.depends_on]
+    assert needed == ["first_left_viewer", "first_right_viewer"]
     assert [port.full_name for port in referee.ports] == ["/pair/left/image"]
-
-
-def test_arguments_and_the_place_of_their_diagnostics(tmp_path: Path) -> None:
-    loading = included(tmp_path, "{file: camera.yaml, arguments: {rate_hz: often, tpic: x}}")
-    assert reported(loading.diagnostics) == [
-        "whole.yaml:3:46 wrong-type",
-        "whole.yaml:3:53 unknown-variable",
-    ]
 
 
 def test_overrides(tmp_path: Path) -> None:
@@ -164,26 +142,44 @@ file: camera.yaml
     system = system_of(included(tmp_path, include))
     driver = system.nodes[0]
     gain = driver.parameter("gain")
-    assert gain is not None
-    assert (str(gain.type), gain.default.value if gain.default else None) == ("double", 2.5)
-    assert gain.maximum is not None
+    assert (str(gain.type), gain.default.value) == ("double", 2.5)
     assert str(gain.maximum.span) == "camera.yaml:10:62"
     assert driver.timers[0].period.unit.value == "period_ms"
     assert system.qos_profiles[0].qos.profile.depth == 7
     assert system.executors[0].kind.value == "events"
 
 
-def reported(diagnostics: list[Diagnostic]) -> list[str]:
-    return [
-        f"{item.primary} {item.rule.name}" for item in diagnostics if item.rule.name not in QUIET
-    ]
+IMPLIED = "lifecycle: {implied_dependencies: false}\n"
+DIRECT = "delivery: dds\n"
+
+
+@pytest.mark.parametrize(
+    ("include", "rest", "part", "expected"),
+    [
+        pytest.param(
+            "{file: camera.yaml, arguments: {rate_hz: often, tpic: x}}", "", "",
+            ["whole.yaml:3:46 wrong-type", "whole.yaml:3:53 unknown-variable"], id="arguments",
+        ),
+        # Only the whole system can set these keys.
+        ("part.yaml", "", IMPLIED, ["part.yaml:2:35 invalid-include"]),
+        ("part.yaml", "", DIRECT, ["part.yaml:2:11 invalid-include"]),
+        ("part.yaml", IMPLIED, IMPLIED, []),
+        ("part.yaml", DIRECT, DIRECT, []),
+    ],
+)  # fmt: skip
+def test_the_place_of_diagnostics(
+    tmp_path: Path, include: str, rest: str, part: str, expected: list[str]
+) -> None:
+    files = {"part.yaml": f"system: part\n{part}nodes: {{a: {{}}}}\n"}
+    assert reported(included(tmp_path, include, rest, files).diagnostics) == expected
 
 
 def test_a_diagnostic_shows_the_way_to_its_file(tmp_path: Path) -> None:
-    wrong = "system: wrong\nnodes: {a: {lifecycle: {depends_on: [b]}}}\n"
-    middle = "system: middle\ninclude: [wrong.yaml]\n"
-    loading = included(tmp_path, "parts/middle.yaml", parts__middle=middle, parts__wrong=wrong)
-    [diagnostic] = loading.diagnostics
+    files = {
+        "parts/wrong.yaml": "system: wrong\nnodes: {a: {lifecycle: {depends_on: [b]}}}\n",
+        "parts/middle.yaml": "system: middle\ninclude: [wrong.yaml]\n",
+    }
+    [diagnostic] = included(tmp_path, "parts/middle.yaml", files=files).diagnostics
     assert str(diagnostic.primary) == "parts/wrong.yaml:2:38"
     assert [str(label.span) for label in diagnostic.related] == [
         "parts/middle.yaml:2:11",
@@ -194,12 +190,15 @@ def test_a_diagnostic_shows_the_way_to_its_file(tmp_path: Path) -> None:
 def test_comments_silence_in_the_file_and_where_it_is_included(tmp_path: Path) -> None:
     unheard = "system: unheard\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
     unheard += "qos: command}}}"
-    comment = "  # compose: ignore[publisher-without-subscription] people listen by hand\n"
-    plain = included(tmp_path, "part.yaml", part=unheard + "\n")
-    there = included(tmp_path, "part.yaml", part=unheard + comment)
-    here = included(tmp_path, "part.yaml" + comment.rstrip(), part=unheard + "\n")
-    assert reported(plain.diagnostics) == ["part.yaml:3:20 publisher-without-subscription"]
-    assert (reported(there.diagnostics), reported(here.diagnostics)) == ([], [])
+    comment = "  # compose: ignore[publisher-without-subscription] people listen by hand"
+    for here, there, expected in (
+        ("", "", ["part.yaml:3:20 publisher-without-subscription"]),
+        ("", comment, []),
+        (comment, "", []),
+    ):
+        files = {"part.yaml": f"{unheard}{there}\n"}
+        found = included(tmp_path, f"part.yaml{here}", files=files).diagnostics
+        assert reported(found) == expected
 
 
 def test_a_comment_that_only_an_including_system_needs_is_used(
@@ -208,14 +207,13 @@ def test_a_comment_that_only_an_including_system_needs_is_used(
     monkeypatch.chdir(tmp_path)
     part = "system: part\nnodes:\n  b:\n    # compose: ignore[start-order] by hand\n"
     part += "    lifecycle: {depends_on: [a]}\n  a: {lifecycle: {autostart: active}}\n"
+    write_files(tmp_path, {"part.yaml": part})
+    assert together("part.yaml") == ["part.yaml:4:23 unused-ignore"]
     changed = "overrides: {nodes: {a: {lifecycle: {autostart: inactive}}}}"
     whole = f"system: whole\ninclude: [{{file: part.yaml, {changed}}}]\n"
-    project(tmp_path, part=part)
-    unused = ["part.yaml:4:23 unused-ignore"]
-    assert reported(collect_diagnostics(load_files([Path("part.yaml")]))) == unused
-    project(tmp_path, whole=whole)
-    assert collect_diagnostics(load_files([Path("part.yaml")])) == [], "whole.yaml may need it"
-    assert collect_diagnostics(load_files([Path("part.yaml"), Path("whole.yaml")])) == []
+    write_files(tmp_path, {"whole.yaml": whole})
+    assert together("part.yaml") == [], "whole.yaml may need it"
+    assert together("part.yaml", "whole.yaml") == []
 
 
 def test_a_folder_reports_each_diagnostic_once(
@@ -230,77 +228,53 @@ connections:
   - {topic: image, from: a.image}
 """
     twice = "for_each: {side: [left, right]}, namespace: '${side}', prefix: '${side}_'"
-    project(tmp_path, whole=f"system: whole\ninclude: [{{file: wrong.yaml, {twice}}}]\n")
-    project(tmp_path, wrong=wrong)
-    assert reported(collect_diagnostics(load_files([Path("whole.yaml"), Path("wrong.yaml")]))) == [
+    files = {
+        "wrong.yaml": wrong,
+        "whole.yaml": f"system: whole\ninclude: [{{file: wrong.yaml, {twice}}}]\n",
+        "other.yaml": "system: other\ninclude: [{file: wrong.yaml, prefix: other_}]\n",
+    }
+    write_files(tmp_path, files)
+    assert together("whole.yaml", "wrong.yaml") == [
         "wrong.yaml:3:32 unknown-node",
         "wrong.yaml:5:28 unknown-port",
     ]
     assert len(load(Path("whole.yaml")).diagnostics) == 2
-    project(tmp_path, other="system: other\ninclude: [{file: wrong.yaml, prefix: other_}]\n")
-    assert len(collect_diagnostics(load_files([Path("whole.yaml"), Path("other.yaml")]))) == 2
+    assert len(together("whole.yaml", "other.yaml")) == 2
 
 
 def test_a_cycle_is_one_diagnostic_wherever_it_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    names = ["c", "a", "b"]
-    for name, following in zip(names, ["a", "b", "c"], strict=True):
-        project(tmp_path, **{name: f"system: {name}\ninclude: [{following}.yaml]\n"})
-    [diagnostic] = collect_diagnostics(load_files([Path(f"{name}.yaml") for name in names]))
+    names = {"c.yaml": "a", "a.yaml": "b", "b.yaml": "c"}
+    texts = {name: f"system: {name[0]}\ninclude: [{other}.yaml]\n" for name, other in names.items()}
+    write_files(tmp_path, texts)
+    [diagnostic] = collect_diagnostics(load_files([Path(name) for name in names]))
     assert diagnostic.message == "this includes itself: a.yaml -> b.yaml -> c.yaml -> a.yaml"
     assert str(diagnostic.primary) == "a.yaml:2:11"
 
 
-def test_node_types_and_behaviors_are_found_next_to_the_included_file(tmp_path: Path) -> None:
-    arm = "system: arm\nnodes:\n  gripper: {type: gripper}\n  lamp: {behavior: 'lamp:Lamp'}\n"
-    gripper = "node: gripper\non_activate: {log: ready}\n"
-    loading = included(tmp_path, "arm/arm.yaml", arm__arm=arm, arm__nodes__gripper=gripper)
-    (tmp_path / "arm" / "lamp.py").write_text(
-        "from composer.behavior import Behavior\nclass Lamp(Behavior):\n    pass\n"
-    )
-    loading = load(tmp_path / "whole.yaml", shown="whole.yaml")
-    system = system_of(loading)
-    assert system.nodes[0].type_found
-    assert system.nodes[1].behavior is not None
-    assert system.nodes[1].behavior.folder == tmp_path / "arm"
-
-
-def test_parameter_files_are_relative_to_the_included_file(tmp_path: Path) -> None:
-    arm = "system: arm\nparameter_files: [arm_parameters.yaml]\nnodes:\n"
-    arm += "  arm: {parameters: {speed: {type: double, default: 1.0}}}\n"
-    values = "/left/arm: {ros__parameters: {speed: 2.0}}\n"
+def test_files_of_an_included_file_are_next_to_it(tmp_path: Path) -> None:
+    files = {
+        "arm/arm.yaml": "system: arm\nparameter_files: [arm_parameters.yaml]\n"
+        "nodes: {gripper: {type: gripper}, lamp: {behavior: 'lamp:Lamp'}}\n",
+        "arm/arm_parameters.yaml": "/left/gripper: {ros__parameters: {speed: 2.0}}\n",
+        "arm/nodes/gripper.yaml": "node: gripper\non_activate: {log: ready}\n"
+        "parameters: {speed: {type: double, default: 1.0}}\n",
+        "arm/lamp.py": "from composer.behavior import Behavior\nclass Lamp(Behavior):\n    pass\n",
+    }
     include = "{file: arm/arm.yaml, namespace: left}"
-    files = {"arm__arm": arm, "arm__arm_parameters": values}
-    system = system_of(included(tmp_path, include, **files))
-    speed = system.nodes[0].parameter("speed")
-    assert speed is not None
-    assert speed.value is not None
-    assert speed.value.value == 2.0
-
-
-def test_what_holds_for_the_whole(tmp_path: Path) -> None:
-    part = "system: part\nlifecycle: {implied_dependencies: false}\nnodes: {a: {}}\n"
-    assert reported(included(tmp_path, "part.yaml", part=part).diagnostics) == [
-        "part.yaml:2:35 invalid-include"
-    ]
-    direct = "system: part\ndelivery: dds\nnodes: {a: {}}\n"
-    assert reported(included(tmp_path, "part.yaml", part=direct).diagnostics) == [
-        "part.yaml:2:11 invalid-include"
-    ]
-    assert (
-        reported(included(tmp_path, "part.yaml", "delivery: dds\n", part=direct).diagnostics) == []
-    )
-    same = "lifecycle: {implied_dependencies: false}\n"
-    assert reported(included(tmp_path, "part.yaml", same, part=part).diagnostics) == []
+    gripper, lamp = system_of(included(tmp_path, include, files=files)).nodes
+    assert gripper.type_found
+    assert gripper.parameter("speed").value.value == 2.0
+    assert lamp.behavior.folder == tmp_path / "arm"
 
 
 def test_no_link_leads_out(tmp_path: Path) -> None:
-    secret = project(tmp_path, secret="system: secret\nnodes: {a: {}}\n")
+    write_files(tmp_path, {"secret.yaml": "system: secret\nnodes: {a: {}}\n"})
     inside = tmp_path / "inside"
     inside.mkdir()
-    (inside / "linked.yaml").symlink_to(secret)
+    (inside / "linked.yaml").symlink_to(tmp_path / "secret.yaml")
     (inside / "loop.yaml").symlink_to(inside / "loop.yaml")
     loading = included(inside, "linked.yaml\n  - loop.yaml\n  - '\\0'")
     assert [item.message for item in loading.diagnostics] == [
@@ -335,11 +309,18 @@ connections:
   - {topic: image, from: left_driver.image, to: recorder.image}
 """
     circle = "system: circle\ninclude: [whole.yaml]\n"
-    loading = included(tmp_path, include, rest, broken="system: [\n", circle=circle)
-    assert [line.split()[1] for line in reported(loading.diagnostics)] == [rule]
+    files = {"broken.yaml": "system: [\n", "circle.yaml": circle}
+    found = reported(included(tmp_path, include, rest, files).diagnostics)
+    assert [line.split()[1] for line in found] == [rule]
 
 
 def test_a_prefix_changes_keys_and_not_the_names_in_ros(tmp_path: Path) -> None:
+    robot = """\
+system: robot
+include:
+  - {file: camera.yaml, prefix: left_, namespace: left}
+  - {file: camera.yaml, prefix: right_, namespace: right}
+"""
     camera = """\
 system: camera
 nodes:
@@ -347,18 +328,7 @@ nodes:
   viewer: {lifecycle: {depends_on: [driver]}, on_activate: {log: go}}
   filter: {component: {package: demo, plugin: Filter}, container: driver}
 """
-    project(
-        tmp_path,
-        camera=camera,
-        robot="""\
-system: robot
-include:
-  - {file: camera.yaml, prefix: left_, namespace: left}
-  - {file: camera.yaml, prefix: right_, namespace: right}
-""",
-    )
-    system = load(tmp_path / "robot.yaml").system
-    assert system is not None
+    system = load_project(tmp_path, {"robot.yaml": robot, "camera.yaml": camera}).system
     assert {node.name.value: node.full_name for node in system.nodes} == {
         "left_driver": "/left/camera_driver",
         "left_viewer": "/left/left_viewer",
@@ -369,3 +339,53 @@ include:
     }
     assert system.nodes[1].depends_on[0].node.value == "left_driver"
     assert str(system.nodes[2].container) == "left_driver"
+
+
+#: Text of a file that is included many times, and the only report about it.
+REPEATED = {
+    "a misspelled 'arguments'": (
+        "argumnets: {text: hello}\nnodes:\n  a: {on_activate: {log: '${text}'}}\n",
+        "'argumnets' is not a key of a system",
+    ),
+    "a misspelled 'nodes'": (
+        "nodse: {a: {on_activate: {log: hello}}}\n", "'nodse' is not a key of a system",
+    ),
+    "a misspelled 'executors'": (
+        "executers: {fast: {kind: events}}\nnodes: {a: {executor: fast}}\n",
+        "'executers' is not a key of a system",
+    ),
+    "a misspelled 'qos_profiles'": (
+        "qos_profile: {odom: {depth: 3}}\nnodes:\n"
+        "  a: {publishers: {p: {type: std_msgs/msg/String, qos: odom, external: true}}}\n",
+        "'qos_profile' is not a key of a system",
+    ),
+    "a cycle": (
+        "nodes:\n  a: {lifecycle: {depends_on: [b]}}\n  b: {lifecycle: {depends_on: [a]}}\n", None,
+    ),
+    "a relative name": (
+        "nodes:\n  a: {services: {ask: {type: std_srvs/srv/Trigger, service: ask/, "
+        "external: true, respond: {success: true}}}}\n", None,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), REPEATED.values(), ids=REPEATED)
+def test_one_cause_in_a_file_that_is_included_many_times_is_reported_once(
+    tmp_path: Path, text: str, message: str | None
+) -> None:
+    include = "{file: part.yaml, prefix: p%d_, namespace: ns%d}"
+    if message is not None:
+        include = include.replace("}", ", overrides: {nodes: {a: {description: x}}}}")
+    whole = "".join(f"  - {include}\n" % (number, number) for number in range(31))
+    whole = f"system: whole\ninclude:\n{whole}"
+    if message is not None:
+        depends = ", ".join(f"p{number}_a" for number in range(31))
+        whole += f"nodes:\n  last: {{lifecycle: {{depends_on: [{depends}]}}}}\n"
+    files = {"whole.yaml": whole, "part.yaml": f"system: part\n{text}"}
+    [diagnostic] = load_project(tmp_path, files).diagnostics
+    if message is None:
+        [alone] = load(tmp_path / "part.yaml").diagnostics
+        assert diagnostic.rule == alone.rule
+    else:
+        assert diagnostic.message == message
+        assert str(diagnostic.hint).startswith("did you mean '")

@@ -1,4 +1,8 @@
+"""Connections and remappings: the names, the QoS and the delivery of ports."""
+
 from __future__ import annotations
+
+import pytest
 
 from composer.model import Delivery, Isolation, System
 from tests.unit.support.resolving import quoted, system_of
@@ -17,6 +21,11 @@ NODES = """\
         subscriptions: {in: {type: x/msg/X}}
         clients: {ask: {type: x/srv/X}}
 """
+
+
+def connected(*connections: str) -> System:
+    lines = [f"      - {connection}\n" for connection in connections]
+    return system_of(f"{NODES}    connections:\n{''.join(lines)}")
 
 
 def full_names(system: System) -> dict[str, str]:
@@ -52,14 +61,8 @@ def test_a_remapping_matches_by_the_expanded_name() -> None:
 
 
 def test_a_connections_profile_wins_over_the_ports() -> None:
-    system = system_of(
-        NODES + "    connections:\n      - {topic: data, from: a.out, to: b.in, qos: odometry}\n"
-    )
-    for node, port in (("a", "out"), ("b", "in")):
-        found = system.node(node)
-        assert found is not None
-        end = found.port(port)
-        assert end is not None
+    system = connected("{topic: data, from: a.out, to: b.in, qos: odometry}")
+    for end in (system.node("a").port("out"), system.node("b").port("in")):
         assert (end.qos.profile.depth, end.qos.explicit) == (1, True)
         assert quoted(end.qos.span) == "odometry"
         assert quoted(end.qos.policy_span("depth")) == "1"
@@ -67,38 +70,36 @@ def test_a_connections_profile_wins_over_the_ports() -> None:
 
 
 def test_an_unknown_name_in_a_connection_stays_as_written() -> None:
-    system = system_of(
-        NODES + "    connections:\n      - {topic: data, from: missing.out, to: [b.no, b, '']}\n"
-    )
+    system = connected("{topic: data, from: missing.out, to: [b.no, b, '']}")
     (data,) = system.connections
     assert [str(end.text) for end in data.sinks] == ["b.no", "b", ""]
     assert [(end.node, end.port) for end in data.sinks] == [("b", "no"), ("", "b"), ("", "")]
     assert all(system.port(end) is None for end in (*data.sources, *data.sinks))
 
 
-def test_a_port_of_another_kind_of_channel_keeps_its_name() -> None:
-    system = system_of(NODES + "    connections:\n      - {topic: data, from: a.ask, to: b.in}\n")
-    assert full_names(system)["a.ask"] == "/robot1/left/ask"
-
-
-def test_of_two_connections_of_a_port_the_first_counts() -> None:
-    system = system_of(
-        NODES
-        + """\
-    connections:
-      - {topic: one, from: a.out}
-      - {topic: two, from: a.out, qos: state}
-      - {topic: one, from: a.out, to: b.in, qos: odometry}
-    """
-    )
-    assert full_names(system)["a.out"] == "/robot1/one"
-    out = system.nodes[0].port("out")
-    assert out is not None
-    assert out.qos.profile.depth == 1
+@pytest.mark.parametrize(
+    ("connections", "port", "full_name"),
+    [
+        pytest.param(
+            ["{topic: data, from: a.ask, to: b.in}"], "a.ask", "/robot1/left/ask", id="other kind"
+        ),
+        pytest.param(
+            ["{topic: one, from: a.out}", "{topic: two, from: a.out, qos: state}",
+             "{topic: one, from: a.out, to: b.in, qos: odometry}"],
+            "a.out", "/robot1/one", id="the first of two counts",
+        ),
+    ],
+)  # fmt: skip
+def test_names_of_ports_with_doubtful_connections(
+    connections: list[str], port: str, full_name: str
+) -> None:
+    system = connected(*connections)
+    assert full_names(system)[port] == full_name
+    assert system.nodes[0].port("out").qos.profile.depth == 1
 
 
 def test_a_connection_says_how_its_ports_are_joined_and_others_follow_the_system() -> None:
-    text = """
+    system = system_of("""
     system: ways
     delivery: dds
     nodes:
@@ -106,11 +107,9 @@ def test_a_connection_says_how_its_ports_are_joined_and_others_follow_the_system
       listener: {subscriptions: {a: {type: std_msgs/msg/String}}}
     connections:
       - {topic: /a, from: talker.a, to: listener.a, delivery: auto, isolation: copy}
-    """
-    system = system_of(text)
+    """)
     assert system.delivery is Delivery.DDS
-    joined = [system.node("talker").port("a"), system.node("listener").port("a")]
-    assert [port.delivery for port in joined] == [Delivery.AUTO, Delivery.AUTO]
-    assert [port.isolation for port in joined] == [Isolation.COPY, Isolation.COPY]
+    for port in (system.node("talker").port("a"), system.node("listener").port("a")):
+        assert (port.delivery, port.isolation) == (Delivery.AUTO, Isolation.COPY)
     free = system.node("talker").port("b")
     assert (free.delivery, free.isolation) == (None, Isolation.SHARE)

@@ -34,65 +34,28 @@ def nodes(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_namespaces_are_below_the_systems_unless_absolute() -> None:
-    system = system_of("""\
-        system: robot
-        namespace: robot1
-        nodes:
-          plain: {}
-          deep: {namespace: arm/left}
-          away: {namespace: /world}
-        """)
-    assert [node.full_name for node in system.nodes] == [
-        "/robot1/plain",
-        "/robot1/arm/left/deep",
-        "/world/away",
-    ]
-    assert quoted(system.nodes[1].namespace.span) == "arm/left"
-
-
-def test_the_command_lines_namespace_takes_the_place_of_the_systems() -> None:
+def test_namespaces_are_below_the_systems_or_the_command_lines_unless_absolute() -> None:
     text = """\
         system: robot
         namespace: robot1
-        nodes: {talker: {}, away: {namespace: /world}}
+        nodes: {plain: {}, deep: {namespace: arm/left}, away: {namespace: /world}}
         """
-    system = system_of(text, namespace="robot2")
-    assert [node.full_name for node in system.nodes] == ["/robot2/talker", "/world/away"]
-    span = system.nodes[0].namespace.span
+    for option, above in ((None, "robot1"), ("robot2", "robot2")):
+        nodes = system_of(text, namespace=option).nodes
+        full_names = [node.full_name for node in nodes]
+        assert full_names == [f"/{above}/plain", f"/{above}/arm/left/deep", "/world/away"]
+        assert quoted(nodes[1].namespace.span) == "arm/left"
+    span = nodes[0].namespace.span
     assert (span.file.path, quoted(span)) == ("--namespace", "robot2")
 
 
-def test_a_type_gives_a_node_what_it_is_made_of(nodes: Path) -> None:
+def test_a_type_gives_a_node_what_it_is_made_of_and_the_node_refines_it(nodes: Path) -> None:
     system = system_of(
         """\
         system: robot
         nodes:
           front: {type: camera, namespace: perception}
-        """,
-        nodes,
-    )
-    (front,) = system.nodes
-    assert (str(front.type_name), front.type_found, front.complete) == ("camera", True, True)
-    assert front.description == "Takes pictures."
-    assert front.behavior is not None
-    assert (front.behavior.module, front.behavior.class_name) == ("camera", "Camera")
-    assert front.behavior.folder == nodes
-    image = front.port("image")
-    assert image is not None
-    assert (image.kind, image.full_name) == (PortKind.PUBLISHER, "/perception/image")
-    assert image.span.file.path.endswith("camera.yaml")
-    assert [timer.name.value for timer in front.timers] == ["shoot"]
-    assert [(name.value, value) for name, value in front.state] == [("count_of_pictures", 0)]
-    assert [event for event, _ in front.reactions] == [Event.ACTIVATE]
-
-
-def test_an_instance_refines_what_its_type_has(nodes: Path) -> None:
-    system = system_of(
-        """\
-        system: robot
-        nodes:
-          front:
+          rear:
             type: camera
             publishers: {image: {qos: state, required: false}}
             timers: {shoot: {rate_hz: 5}}
@@ -101,21 +64,35 @@ def test_an_instance_refines_what_its_type_has(nodes: Path) -> None:
         """,
         nodes,
     )
-    (front,) = system.nodes
-    image = front.ports[0]
+    front, rear = system.nodes
+    assert (str(front.type_name), front.type_found, front.complete) == ("camera", True, True)
+    assert front.description == "Takes pictures."
+    assert (front.behavior.module, front.behavior.class_name) == ("camera", "Camera")
+    assert front.behavior.folder == nodes
+    image = front.port("image")
+    assert (image.kind, image.full_name) == (PortKind.PUBLISHER, "/perception/image")
+    assert image.span.file.path.endswith("camera.yaml")
+    assert [timer.name.value for timer in front.timers] == ["shoot"]
+    assert [(name.value, value) for name, value in front.state] == [("count_of_pictures", 0)]
+    assert [event for event, _ in front.reactions] == [Event.ACTIVATE]
+    image = rear.ports[0]
     assert (str(image.interface), image.qos.profile.depth) == ("std_msgs/msg/String", 1)
-    assert not image.required
-    assert image.span.file.path == "robot.yaml"
-    period = front.timers[0].period
-    assert (period.value, period.unit) == (5, "rate_hz")
-    assert front.timers[0].reaction is not None
-    assert [value for _, value in front.state] == [7]
-    assert dict(front.reactions)[Event.ACTIVATE].span.file.path == "robot.yaml"
+    assert (image.required, image.span.file.path) == (False, "robot.yaml")
+    timer = rear.timers[0]
+    assert (timer.period.value, timer.period.unit) == (5, "rate_hz")
+    assert timer.reaction is not None
+    assert [value for _, value in rear.state] == [7]
+    assert dict(rear.reactions)[Event.ACTIVATE].span.file.path == "robot.yaml"
 
 
 def test_a_type_file_with_errors_reports_them_once_and_is_incomplete(nodes: Path) -> None:
     (nodes / "broken.yaml").write_text("node: broken\nservices: [\n")
     (nodes / "system.yaml").write_text("system: robot\n")
+    (nodes / "wrong.yaml").write_text(
+        "node: wrong\nvariables: {text: {default: a}}\ndescription: ${text}\n"
+        "timers: {tick: {period_ms: 5, when: 1 +}}\n"
+        "publishers: {out: {type: std_msgs/msg/String}}\n"
+    )
     system, diagnostics = resolve_text(
         """\
         system: robot
@@ -123,33 +100,19 @@ def test_a_type_file_with_errors_reports_them_once_and_is_incomplete(nodes: Path
           one: {type: broken}
           two: {type: broken}
           three: {type: system}
+          four: {type: wrong}
+          five: {type: wrong, variables: {text: b}}
+          six: {type: wrong, publishers: {out: {qos: state}}}
         """,
         nodes,
     )
-    assert [(node.type_found, node.complete) for node in system.nodes] == [(True, False)] * 3
-    paths = [Path(diagnostic.primary.file.path).name for diagnostic in diagnostics]
-    assert paths == ["broken.yaml", "system.yaml"]
-    assert diagnostics[1].rule.name == "wrong-kind-of-file"
+    assert [(node.type_found, node.complete) for node in system.nodes[:3]] == [(True, False)] * 3
+    assert [(Path(item.primary.file.path).name, item.rule.name) for item in diagnostics] == [
+        ("broken.yaml", "yaml-syntax"),
+        ("system.yaml", "wrong-kind-of-file"),
+        ("wrong.yaml", "invalid-expression"),
+    ]
     assert "is a system, not a node type" in diagnostics[1].message
-
-
-def test_an_error_in_an_expression_of_a_type_is_reported_once(nodes: Path) -> None:
-    (nodes / "broken.yaml").write_text(
-        "node: broken\nvariables: {text: {default: a}}\ndescription: ${text}\n"
-        "timers: {tick: {period_ms: 5, when: 1 +}}\n"
-        "publishers: {out: {type: std_msgs/msg/String}}\n"
-    )
-    _, diagnostics = resolve_text(
-        """\
-        system: robot
-        nodes:
-          one: {type: broken}
-          two: {type: broken, variables: {text: b}}
-          three: {type: broken, publishers: {out: {qos: state}}}
-        """,
-        nodes,
-    )
-    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-expression"]
 
 
 def test_a_variable_without_value_makes_nothing_wrong() -> None:
@@ -195,18 +158,13 @@ def test_a_variable_without_default_must_be_given(tmp_path: Path) -> None:
         """,
         tmp_path,
     )
-    assert [(diagnostic.rule.name, diagnostic.primary.line) for diagnostic in diagnostics] == [
-        ("missing-variable", 4),
-        ("missing-variable", 5),
-    ]
+    found = [(diagnostic.rule.name, diagnostic.primary.line) for diagnostic in diagnostics]
+    assert found == [("missing-variable", 4), ("missing-variable", 5)]
     assert diagnostics[0].message == "node type 'relay' needs a value for its variable 'kind'"
     assert quoted(diagnostics[0].primary) == "relay"
     assert quoted(diagnostics[0].related[0].span) == "kind"
-    assert [node.ports[0].interface.value for node in system.nodes] == [
-        "x/msg/X",
-        "${kind}",
-        "${kind}",
-    ]
+    types = [node.ports[0].interface.value for node in system.nodes]
+    assert types == ["x/msg/X", "${kind}", "${kind}"]
 
 
 def test_a_mistake_in_an_argument_is_reported_at_every_argument(tmp_path: Path) -> None:
@@ -214,17 +172,9 @@ def test_a_mistake_in_an_argument_is_reported_at_every_argument(tmp_path: Path) 
         "node: filter\nvariables: {condition: {}, count: {}}\n"
         "subscriptions: {in: {type: x/msg/X, when: '${condition}', required: '${count}'}}\n"
     )
-    _, diagnostics = resolve_text(
-        """\
-        system: robot
-        nodes:
-          one: {type: filter, variables: {condition: 1 +, count: true}}
-          two: {type: filter, variables: {condition: 1 +, count: true}}
-          three: {type: filter, variables: {condition: count > 1, count: [1]}}
-          four: {type: filter, variables: {condition: count > 1, count: [1]}}
-        """,
-        tmp_path,
-    )
+    variables = ["{condition: 1 +, count: true}"] * 2 + ["{condition: count > 1, count: [1]}"] * 2
+    nodes = [f"  n{i}: {{type: filter, variables: {item}}}\n" for i, item in enumerate(variables)]
+    _, diagnostics = resolve_text(f"system: robot\nnodes:\n{''.join(nodes)}", tmp_path)
     assert [diagnostic.primary.line for diagnostic in diagnostics] == [3, 4, 5, 6]
     assert {diagnostic.primary.file.path for diagnostic in diagnostics} == {"robot.yaml"}
 

@@ -1,3 +1,5 @@
+"""Parameters: their types, their values, and settings of the command line."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -5,12 +7,9 @@ from pathlib import Path
 import pytest
 
 from composer.language.tree import Plain
-from composer.model import Parameter, System
-from tests.unit.support.resolving import system_of
-
-
-def parameters(system: System) -> dict[str, Parameter]:
-    return {parameter.name.value: parameter for parameter in system.nodes[0].parameters}
+from composer.model import Parameter
+from composer.model.resolve import OverrideOptions, read_overrides
+from tests.unit.support.resolving import quoted, resolve_text, system_of
 
 
 def start_value(parameter: Parameter) -> Plain:
@@ -18,21 +17,16 @@ def start_value(parameter: Parameter) -> Plain:
 
 
 def test_a_system_gives_values_to_what_its_type_declares(tmp_path: Path) -> None:
-    (tmp_path / "planner.yaml").write_text(
-        "node: planner\n"
-        "parameters:\n"
-        "  speed: {type: double, default: 1.0}\n"
-        "  points: {type: double_array}\n"
-        "  name: {type: string, default: bob}\n"
-    )
-    system = system_of(
-        """\
-        system: robot
-        nodes: {planner: {type: planner, parameters: {speed: 3, points: [1, 2.5], name: null}}}
-        """,
-        tmp_path,
-    )
-    found = parameters(system)
+    (tmp_path / "planner.yaml").write_text("""\
+node: planner
+parameters:
+  speed: {type: double, default: 1.0}
+  points: {type: double_array}
+  name: {type: string, default: bob}
+""")
+    parameters = "{speed: 3, points: [1, 2.5], name: null}"
+    text = f"system: robot\nnodes: {{planner: {{type: planner, parameters: {parameters}}}}}\n"
+    found = {item.name.value: item for item in system_of(text, tmp_path).nodes[0].parameters}
     assert {name: start_value(item) for name, item in found.items()} == {
         "speed": 3.0,
         "points": [1.0, 2.5],
@@ -40,15 +34,14 @@ def test_a_system_gives_values_to_what_its_type_declares(tmp_path: Path) -> None
     }
     speed = found["speed"]
     assert isinstance(start_value(speed), float)
-    assert speed.value is not None
     assert speed.value.span.file.path == "robot.yaml"
-    assert speed.default is not None
     assert speed.default.value == 1.0
 
 
 @pytest.mark.parametrize(
     ("written", "kind", "value"),
     [
+        # A bare value declares a parameter of its type, or of none.
         ("true", "bool", True),
         ("3", "integer", 3),
         ("3.0", "double", 3.0),
@@ -57,42 +50,76 @@ def test_a_system_gives_values_to_what_its_type_declares(tmp_path: Path) -> None
         ("[1, 2]", "integer_array", [1, 2]),
         ("[1, 2.5]", "double_array", [1.0, 2.5]),
         ("[a]", "string_array", ["a"]),
+        ("null", "${}", None),
+        ("'${x}'", "${}", "${x}"),
+        ("['${x}']", "${}", ["${x}"]),
+        ("[]", "", []),
+        ("[1, a]", "", [1, "a"]),
+        # A value of another type stays as it is written.
+        ("{type: integer, default: 2.0}", "integer", 2.0),
+        ("{type: double, default: true}", "double", True),
+        ("{type: double, default: fast}", "double", "fast"),
+        ("{type: double_array, default: [1, true, a]}", "double_array", [1.0, True, "a"]),
     ],
 )
-def test_a_bare_value_declares_a_parameter_of_its_type(
-    written: str, kind: str, value: object
-) -> None:
+def test_types_and_values(written: str, kind: str, value: object) -> None:
     system = system_of(f"system: robot\nnodes: {{robot: {{parameters: {{p: {written}}}}}}}\n")
-    parameter = parameters(system)["p"]
-    assert (parameter.type.value, start_value(parameter)) == (kind, value)
+    (parameter,) = system.nodes[0].parameters
+    assert (parameter.type.value, repr(start_value(parameter))) == (kind, repr(value))
     assert parameter.value is parameter.default
-    assert [type(item) for item in [start_value(parameter)]] == [type(value)]
+
+
+SYSTEM = """\
+    system: robot
+    nodes:
+      planner:
+        parameters:
+          max_velocity: {type: double, default: 1.0}
+          limits.upper: {type: integer_array, default: [1]}
+    """
+
+
+def test_the_last_setting_is_the_parameters_value() -> None:
+    settings = ["planner.max_velocity=9", "planner.max_velocity=2", "planner.limits.upper=[3, 4]"]
+    velocity, upper = system_of(SYSTEM, settings=settings).nodes[0].parameters
+    assert (velocity.value.value, upper.value.value) == (2.0, [3, 4])
+    assert isinstance(velocity.value.value, float)
+    assert (velocity.value.span.file.path, quoted(velocity.value.span)) == ("--set", "2")
+    assert upper.value.span.line == 3
+    assert velocity.default.value == 1.0
 
 
 @pytest.mark.parametrize(
-    ("written", "kind"),
-    [("null", "${}"), ("'${x}'", "${}"), ("['${x}']", "${}"), ("[]", ""), ("[1, a]", "")],
+    ("text", "value"), [("true", True), ("'2'", "2"), ("NO", "NO"), ("a=b", "a=b"), ("0x10", 16)]
 )
-def test_a_bare_value_may_have_no_type(written: str, kind: str) -> None:
-    system = system_of(f"system: robot\nnodes: {{robot: {{parameters: {{p: {written}}}}}}}\n")
-    assert parameters(system)["p"].type.value == kind
+def test_values_are_yaml(text: str, value: object) -> None:
+    overrides, diagnostics = read_overrides(OverrideOptions((f"planner.flag={text}",)))
+    assert diagnostics == []
+    scalar = overrides.by_node["planner"]["flag"].value
+    assert scalar.value == value
+    assert quoted(scalar.span).strip("'") == str(text).strip("'")
 
 
-@pytest.mark.parametrize(
-    ("kind", "written", "value"),
-    [
-        ("integer", "2.0", 2.0),
-        ("double", "true", True),
-        ("double", "fast", "fast"),
-        ("double_array", "[1, true, a]", [1.0, True, "a"]),
-    ],
-)
-def test_a_value_of_another_type_stays_as_it_is_written(
-    kind: str, written: str, value: object
-) -> None:
-    system = system_of(
-        "system: robot\nnodes:\n"
-        f"  robot: {{parameters: {{p: {{type: {kind}, default: {written}}}}}}}\n"
-    )
-    found = start_value(parameters(system)["p"])
-    assert (found, type(found)) == (value, type(value))
+def test_what_is_not_there_is_unknown() -> None:
+    system = system_of(SYSTEM, settings=["planer.max_velocity=2.0", "planner.max_speed=2.0"])
+    assert [(item.section, item.name.value) for item in system.unknown] == [("nodes", "planer")]
+    assert system.unknown[0].known == ("planner",)
+    (unknown,) = system.nodes[0].unknown
+    assert (unknown.section, unknown.name.value) == ("parameters", "max_speed")
+    assert quoted(unknown.name.span) == "max_speed"
+    alone = system_of("node: planner\nparameters: {a: 1}\n", settings=["planner.a=2", "other.a=2"])
+    assert alone.nodes[0].parameters[0].value.value == 2
+    assert [item.name.value for item in alone.unknown] == ["other"]
+
+
+@pytest.mark.parametrize("text", ["", "=", "planner", "planner=1", "planner.=1", ".x=1", "a.b"])
+def test_what_has_no_such_form_is_refused(text: str) -> None:
+    _, diagnostics = resolve_text(SYSTEM, settings=["planner.max_velocity=2.0", text])
+    assert [diagnostic.rule.name for diagnostic in diagnostics] == ["invalid-override"]
+    assert diagnostics[0].primary.line == 2
+
+
+def test_a_value_that_is_not_yaml_is_a_diagnostic_at_its_place() -> None:
+    _, diagnostics = resolve_text(SYSTEM, settings=["planner.max_velocity=[1, 2"])
+    assert {diagnostic.primary.file.path for diagnostic in diagnostics} == {"--set"}
+    assert diagnostics[0].primary.file.line(1) == "planner.max_velocity=[1, 2"

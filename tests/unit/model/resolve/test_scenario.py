@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import load, load_files
+from composer.loading import load
 from composer.loading.reported import LoadResult
 from composer.model.scenario import EventKind, ExpectationKind, Verb
 from tests.unit.support.checking import write_files
@@ -60,16 +60,9 @@ def reported(result: LoadResult) -> list[str]:
 def test_a_stand_in_replaces_the_implementation_and_keeps_the_wiring(
     folder: Path, system: str
 ) -> None:
-    result = scenario(
-        folder,
-        f"{STAND_IN}arguments: {{rate_hz: 20}}\n",
-        system,
-    )
+    result = scenario(folder, f"{STAND_IN}arguments: {{rate_hz: 20}}\n", system)
     assert reported(result) == []
-    assert result.system is not None
     lidar, viewer = result.system.node("lidar"), result.system.node("viewer")
-    assert lidar is not None
-    assert viewer is not None
     assert (lidar.executable, lidar.full_name) == (None, "/bot/lidar")
     assert lidar.ports[0].full_name == "/bot/scan"
     assert lidar.initial_parameters == {"text": "wall"}
@@ -106,7 +99,7 @@ def test_steps_and_expectations(folder: Path) -> None:
 
 def test_errors_of_the_system_are_reported_with_its_file(folder: Path) -> None:
     (folder / "systems" / "robot.yaml").write_text(SYSTEM.replace("viewer.points", "viewer.point"))
-    [result] = load_files([folder / "scenarios" / "test.yaml"] if scenario(folder, "") else [])
+    result = scenario(folder, "")
     [error] = [item for item in result.diagnostics if item.rule.name == "unknown-port"]
     assert error.primary.file.path.endswith("robot.yaml")
     assert result.scenario is not None

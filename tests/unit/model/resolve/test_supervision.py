@@ -1,11 +1,21 @@
-"""Supervision: a node overrides its system, key by key."""
+"""Supervision, dependencies and introspection: a node overrides its system, key by key."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from composer.model import OnFailure, PrimaryState, RestartBudget, Supervision, Watch
-from composer.model.dependencies import dependency_edges
+from composer.model import (
+    DEFAULT_INTROSPECTION,
+    Introspection,
+    OnFailure,
+    PrimaryState,
+    RestartBudget,
+    Supervision,
+    Watch,
+)
+from composer.model.dependencies import dependency_edges, needed_states
 from tests.unit.support.resolving import quoted, system_of
 
 SYSTEM = """
@@ -28,34 +38,27 @@ nodes:
 """
 
 
-def of(name: str) -> Supervision:
-    node = system_of(SYSTEM).node(name)
-    assert node is not None
-    return node.supervision
-
-
 def test_a_node_overrides_it_key_by_key() -> None:
-    own = of("own")
+    own = system_of(SYSTEM).node("own").supervision
     assert (own.timeout_ms, own.policy) == (500, OnFailure.SHUTDOWN)
     assert own.restart == RestartBudget(
         max_attempts=3, window_ms=1000, backoff_ms=100, then=OnFailure.SHUTDOWN
     )
-    assert own.restart.span is not None
     assert quoted(own.restart.span) == "restart"
     limits = {name.value: limit.value for name, limit in own.watch.topics}
     assert limits == {"scan": 100, "status": 900}
     assert own.watch.silence_ms is None
-    assert own.watch.callback_ms is not None
     assert own.watch.callback_ms.value == 50
 
 
-def test_without_a_word_nodes_that_fail_are_isolated_and_nothing_is_watched() -> None:
+def test_by_default_nodes_that_fail_are_isolated_and_nothing_is_watched() -> None:
     system = system_of("system: robot\nnodes: {a: {}}\n")
     assert system.nodes[0].supervision == Supervision()
     assert system.supervision.policy is OnFailure.ISOLATE
     assert system.supervision.watch == Watch()
-    assert system.supervision.timeout_ms == 10_000
-    assert system.namespace == "/"
+    assert (system.supervision.timeout_ms, system.namespace) == (10_000, "/")
+    assert system.nodes[0].introspection == DEFAULT_INTROSPECTION
+    assert DEFAULT_INTROSPECTION.left_to_manager == ()
 
 
 @pytest.mark.parametrize(
@@ -71,15 +74,67 @@ lifecycle: {implied_dependencies: SWITCH}
 nodes:
   client:
     clients: {plan: {type: std_srvs/srv/Trigger}}
-    lifecycle: {depends_on: {power: inactive}}
+    lifecycle: {depends_on: {power: inactive, server: inactive}}
   server: {services: {plan: {type: std_srvs/srv/Trigger}}}
   power: {}
 """
 
 
-@pytest.mark.parametrize(("switch", "implied"), [("true", {"server"}), ("false", set())])
-def test_implied_dependencies_can_be_switched_off(switch: str, implied: set[str]) -> None:
-    edges = dependency_edges(system_of(SERVED.replace("SWITCH", switch)))
+@pytest.mark.parametrize(
+    ("switch", "implied", "state"),
+    [("true", {"server"}, PrimaryState.ACTIVE), ("false", set(), PrimaryState.INACTIVE)],
+)
+def test_implied_dependencies_can_be_switched_off(
+    switch: str, implied: set[str], state: PrimaryState
+) -> None:
+    """Of two dependencies on a node the higher state counts: a service needs an active server."""
+    system = system_of(SERVED.replace("SWITCH", switch))
+    edges = dependency_edges(system)
     assert {edge.on for edge in edges if edge.implied} == implied
-    declared = [edge for edge in edges if not edge.implied]
-    assert [(edge.on, edge.state) for edge in declared] == [("power", PrimaryState.INACTIVE)]
+    declared = {edge.on: edge.state for edge in edges if not edge.implied}
+    assert declared == dict.fromkeys(("power", "server"), PrimaryState.INACTIVE)
+    needed = {"power": PrimaryState.INACTIVE, "server": state}
+    assert needed_states(system) == {"client": needed, "server": {}, "power": {}}
+
+
+NODE_TYPE = """
+node: lean
+introspection: {rosout: false, type_description: false}
+"""
+OFFERING = """
+system: robot
+introspection: {parameters: false, rosout: true}
+nodes:
+  plain: {}
+  logger: {introspection: {logger_services: true}}
+  own: {introspection: {parameters: true, lifecycle_services: false}}
+  typed: {type: lean}
+  both: {type: lean, introspection: {rosout: false}}
+"""
+
+
+def test_introspection_of_a_node_is_before_the_systems_and_the_types(tmp_path: Path) -> None:
+    (tmp_path / "lean.yaml").write_text(NODE_TYPE, encoding="utf-8")
+    found = {node.name.value: node.introspection for node in system_of(OFFERING, tmp_path).nodes}
+    assert found == {
+        "plain": Introspection(parameters=False),
+        "logger": Introspection(parameters=False, logger_services=True),
+        "own": Introspection(lifecycle_services=False),
+        "typed": Introspection(parameters=False, type_description=False),
+        "both": Introspection(parameters=False, rosout=False, type_description=False),
+    }
+
+
+@pytest.mark.parametrize(
+    ("introspection", "left"),
+    [
+        (Introspection(rosout=False, type_description=False), ()),
+        (Introspection(parameters=False), ("parameters",)),
+        (Introspection(lifecycle_services=False), ("lifecycle",)),
+        (Introspection(parameters=False, lifecycle_services=False), ("lifecycle", "parameters")),
+    ],
+)
+def test_the_manager_answers_for_parameters_and_lifecycle(
+    introspection: Introspection, left: tuple[str, ...]
+) -> None:
+    assert introspection.left_to_manager == left
