@@ -70,14 +70,11 @@ def test_text(text: str, kind: type, value: object) -> None:
     assert evaluate(template, SCOPE) == value
 
 
-@pytest.mark.parametrize("value", [None, True, 3, 2.5])
-def test_other_scalars_are_constants(value: object) -> None:
-    assert evaluate(compiled(scalar(value)), SCOPE) is value
-
-
-@pytest.mark.parametrize("text", ["${name}", "a ${name} {", "{${name}}"])
-def test_a_text_with_an_open_variable_is_left_alone(text: str) -> None:
-    assert compiled(scalar(text)) == Constant(text, Span(FILE, 1, 1))
+def test_other_scalars_and_texts_with_open_variables_are_constants() -> None:
+    for value in (None, True, 3, 2.5):
+        assert evaluate(compiled(scalar(value)), SCOPE) is value
+    for text in ("${name}", "a ${name} {", "{${name}}"):
+        assert compiled(scalar(text)) == Constant(text, Span(FILE, 1, 1))
 
 
 def test_maps_and_lists_are_worked_out_in_depth() -> None:
@@ -90,34 +87,29 @@ def test_maps_and_lists_are_worked_out_in_depth() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "marked", "message", "hint"),
+    ("text", "marked", "message"),
     [
-        ("a {count", "{", "'{' is not closed", "write '{{' for a brace"),
-        ("a } b", "}", "'}' closes nothing", "write '}}' for a brace"),
-        ("{count}}", "}", "'}' closes nothing", "write '}}' for a brace"),
-        ("{}", "}", "the expression is empty", None),
-        ("x { count + }", "+", "something is missing at the end", None),
-        ("x {sqr(2)}", "sqr", "unknown function 'sqr'", "did you mean 'sqrt'?"),
-        (
-            "{count:99999d}",
-            "99999d",
-            "'99999d' is not a format",
-            "a format is like .2f, 5d, >10 or x",
-        ),
-        ("{count:{count}}", "{count", "'{count' is not a format", None),
-        ("{count!r}", "!", "unexpected '!'", "write 'not'"),
-        ("{count:}", "}", "'' is not a format", None),
-        ("{count:*^5}", "*^5", "'*^5' is not a format", None),
+        ("a {count", "{", "'{' is not closed (write '{{' for a brace)"),
+        ("a } b", "}", "'}' closes nothing (write '}}' for a brace)"),
+        ("{count}}", "}", "'}' closes nothing (write '}}' for a brace)"),
+        ("{}", "}", "the expression is empty ("),
+        ("x { count + }", "+", "something is missing at the end ("),
+        ("x {sqr(2)}", "sqr", "unknown function 'sqr' (did you mean 'sqrt'?)"),
+        ("{count:99999d}", "99999d",
+         "'99999d' is not a format (a format is like .2f, 5d, >10 or x)"),
+        ("{count:{count}}", "{count", "'{count' is not a format ("),
+        ("{count!r}", "!", "unexpected '!' (write 'not')"),
+        ("{count:}", "}", "'' is not a format ("),
+        ("{count:*^5}", "*^5", "'*^5' is not a format ("),
     ],
-)
-def test_problem_is_located(text: str, marked: str, message: str, hint: str | None) -> None:
+)  # fmt: skip
+def test_problem_is_located(text: str, marked: str, message: str) -> None:
     template, problems = compile_template(scalar(text, quoted=True))
     assert template is None
     problem = problems[0]
     start = problem.span.column - COLUMN - 1
-    assert problem.message == message
+    assert f"{problem.message} ({problem.hint})".startswith(message)
     assert text[start : start + problem.span.length] == marked
-    assert hint in (None, problem.hint)
 
 
 def test_a_problem_in_an_escaped_text_is_placed_at_the_whole() -> None:
@@ -129,8 +121,7 @@ def test_a_problem_in_an_escaped_text_is_placed_at_the_whole() -> None:
 def test_every_problem_of_a_tree_is_found() -> None:
     tree = Sequence((scalar("{a +}"), scalar("{b"), scalar("{c.__d}")), Span(FILE, 1, 1))
     template, problems = compile_template(tree)
-    assert template is None
-    assert len(problems) == 3
+    assert (template, len(problems)) == (None, 3)
 
 
 def test_expressions_are_listed_with_their_places() -> None:

@@ -91,14 +91,6 @@ def test_syntax(text: str, expected: str, hint: str) -> None:
 
 
 @pytest.mark.usefixtures("parser")
-def test_misplaced_line_shows_where_its_map_begins() -> None:
-    (diagnostic,) = diagnostics_in("x: 1\na:\n  b: 1\n c: 2")
-    assert [(str(label.span), label.message) for label in diagnostic.related] == [
-        ("f:1:1", "the map begins here")
-    ]
-
-
-@pytest.mark.usefixtures("parser")
 @pytest.mark.parametrize(
     ("text", "rule", "expected"),
     [
@@ -146,9 +138,17 @@ def test_diagnostic(text: str, rule: str, expected: str) -> None:
     assert located(diagnostic).startswith(expected)
 
 
-def test_second_key_shows_the_first() -> None:
-    (diagnostic,) = diagnostics_in("x:\n  a: 1\n  b: 2\n  a: 3")
-    assert [str(label.span) for label in diagnostic.related] == ["f:2:3"]
+@pytest.mark.usefixtures("parser")
+@pytest.mark.parametrize(
+    ("text", "labels"),
+    [
+        ("x: 1\na:\n  b: 1\n c: 2", ["f:1:1 the map begins here"]),
+        ("x:\n  a: 1\n  b: 2\n  a: 3", ["f:2:3 first here"]),
+    ],
+)
+def test_related_places(text: str, labels: list[str]) -> None:
+    (diagnostic,) = diagnostics_in(text)
+    assert [f"{label.span} {label.message}" for label in diagnostic.related] == labels
 
 
 @pytest.mark.parametrize(

@@ -6,24 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.diagnostics import Diagnostic
 from composer.language.document.limits import MAX_COPIES
 from composer.language.expand import expand
-from composer.language.tree import Mapping, Plain, plain
-from tests.unit.support.checking import diagnostics_in
+from composer.language.tree import Plain, plain
+from tests.unit.support.checking import diagnostics_in, places
 from tests.unit.support.resolving import tree_of
 
 
-def expanded(text: str) -> tuple[Mapping, list[Diagnostic]]:
-    return expand(tree_of(text), {})[:2]
-
-
 def nodes(written: str, variables: str = "{}") -> Plain:
-    tree, diagnostics = expanded(f"system: s\narguments: {variables}\nnodes: {written}")
+    text = f"system: s\narguments: {variables}\nnodes: {written}"
+    tree, diagnostics, *_ = expand(tree_of(text), {})
     assert [item.message for item in diagnostics if item.rule.name != "unused-declaration"] == []
-    found = tree.get("nodes")
-    assert found is not None
-    return plain(found)
+    return plain(tree.get("nodes"))
 
 
 @pytest.mark.parametrize(
@@ -48,11 +42,12 @@ def test_nodes(written: str, result: Plain) -> None:
 
 
 def test_connections_and_includes() -> None:
-    tree, diagnostics = expanded(
-        "system: s\n"
-        "include: [{for_each: {r: [a, b]}, file: '${r}.yaml'}, c.yaml]\n"
-        "connections: [{for_each: {r: [a, b]}, topic: '/${r}', from: '${r}.out'}]\n"
-    )
+    text = """\
+system: s
+include: [{for_each: {r: [a, b]}, file: '${r}.yaml'}, c.yaml]
+connections: [{for_each: {r: [a, b]}, topic: '/${r}', from: '${r}.out'}]
+"""
+    tree, diagnostics, *_ = expand(tree_of(text), {})
     assert diagnostics == []
     assert plain(tree) == {
         "system": "s",
@@ -98,10 +93,9 @@ nodes:
     lifecycle: {depends_on: ["lamp_${i}"]}
     publishers: {image: {type: std_msgs/msg/String, qos: command, dpth: 1}}
 """
-    found = [(item.rule.name, str(item.primary)) for item in diagnostics_in(text, tmp_path)]
-    assert found == [
-        ("unknown-node", "system.yaml:5:30"),
-        ("unknown-key", "system.yaml:6:67"),
+    assert places(diagnostics_in(text, tmp_path)) == [
+        "system.yaml:5:30 unknown-node",
+        "system.yaml:6:67 unknown-key",
     ]
 
 
@@ -119,25 +113,14 @@ nodes:
 connections:
   - {topic: /images, from: ["c*_?.image", "*_*.image"], to: viewer.image}
 """
-    [diagnostic] = diagnostics_in(text, tmp_path)  # a star is the only sign that stands for others
-    assert (
-        diagnostic.message == "'c*_?.image' names node 'c*_?', which is not a node of this system"
-    )
+    [found] = diagnostics_in(text, tmp_path)  # a star is the only sign that stands for others
+    assert found.message == "'c*_?.image' names node 'c*_?', which is not a node of this system"
 
 
-@pytest.mark.parametrize(
-    ("value", "kind"), [("{default: {b: c}}", "a map"), ("[]", "a list")], ids=["map", "list"]
-)
+@pytest.mark.parametrize(("value", "kind"), [("{default: {b: c}}", "a map"), ("[]", "a list")])
 def test_a_map_or_list_is_not_a_name(tmp_path: Path, value: str, kind: str) -> None:
-    text = f"""\
-system: s
-arguments: {{a: {value}}}
-nodes:
-  ${{a}}: {{on_activate: {{log: started}}}}
-"""
-    [diagnostic] = diagnostics_in(text, tmp_path)
-    assert (diagnostic.rule.name, str(diagnostic.primary)) == (
-        "malformed-variable",
-        "system.yaml:4:3",
-    )
-    assert diagnostic.message == f"'${{a}}' is {kind}, which cannot be a name"
+    nodes = "nodes:\n  ${a}: {on_activate: {log: started}}\n"
+    text = f"system: s\narguments: {{a: {value}}}\n{nodes}"
+    found = diagnostics_in(text, tmp_path)
+    assert places(found) == ["system.yaml:4:3 malformed-variable"]
+    assert found[0].message == f"'${{a}}' is {kind}, which cannot be a name"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import runpy
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +40,8 @@ def parts_of(part: Any) -> Iterator[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_is_a_schema(name: str) -> None:
+def test_a_schema_is_valid_and_made_from_its_parts(name: str) -> None:
     Draft7Validator.check_schema(schema(name))
-
-
-@pytest.mark.parametrize("name", SCHEMAS)
-def test_is_made_from_its_parts(name: str) -> None:
     build = runpy.run_path(str(schemas_folder() / "build.py"))
     made = build["build"](name)
     assert build["path"](name).read_text() == made, "run 'python schemas/build.py'"
@@ -57,13 +53,7 @@ def test_a_definition_means_the_same_in_every_schema() -> None:
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_every_keyword_has_its_words(name: str) -> None:
-    used = {keyword for part in parts_of(schema(name)) for keyword in part}
-    assert used - ANNOTATIONS - APPLICATORS <= KEYWORDS
-
-
-@pytest.mark.parametrize("name", SCHEMAS)
-def test_every_key_is_described(name: str) -> None:
+def test_every_keyword_has_its_words_and_every_key_is_described(name: str) -> None:
     whole = schema(name)
     definitions = whole["definitions"]
 
@@ -71,6 +61,8 @@ def test_every_key_is_described(name: str) -> None:
         reference = part.get("$ref", "").removeprefix("#/definitions/")
         return "description" in part or (reference != "" and described(definitions[reference]))
 
+    used = {keyword for part in parts_of(whole) for keyword in part}
+    assert used - ANNOTATIONS - APPLICATORS <= KEYWORDS
     bare = [
         f"{part.get('title')}: {key}"
         for part in parts_of(whole)
@@ -81,19 +73,10 @@ def test_every_key_is_described(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_every_map_of_keys_is_closed(name: str) -> None:
-    open_maps = [
-        part.get("title")
-        for part in parts_of(schema(name))
-        if "properties" in part and part.get("additionalProperties") is not False
-    ]
-    assert open_maps == []
-
-
-@pytest.mark.parametrize("name", SCHEMAS)
-def test_examples_and_defaults_are_valid(name: str) -> None:
+def test_every_map_of_keys_is_closed_and_examples_and_defaults_are_valid(name: str) -> None:
     whole = schema(name)
     for part in parts_of(whole):
+        assert "properties" not in part or part.get("additionalProperties") is False, part
         values = [*part.get("examples", ()), *([part["default"]] if "default" in part else [])]
         validator = Draft7Validator({**part, "definitions": whole["definitions"]})
         for value in values:
@@ -108,23 +91,16 @@ def test_unknown_schema() -> None:
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
 def test_shipped_file(path: Path) -> None:
     tree, _, diagnostics = read_document(path)
-    assert tree is not None
     kind = kind_of(tree)
-    assert kind is not None
     assert [item.message for item in (*diagnostics, *check_schema(tree, kind))] == []
     # An editor has plain JSON Schema, without the composer's stricter idea of an integer.
     assert Draft7Validator(schema(kind)).is_valid(plain(tree))
-
-
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
-def test_an_editor_finds_the_schema_of_a_shipped_file(path: Path) -> None:
+    # It finds the schema by the first line.
     first = path.read_text(encoding="utf-8").splitlines()[0]
     mark, _, reference = first.partition("=")
     assert mark == "# yaml-language-server: $schema"
-    tree, _, _ = read_document(path)
-    assert tree is not None
     found = json.loads((path.parent / reference).read_text(encoding="utf-8"))
-    assert found == schema(str(kind_of(tree)))
+    assert found == schema(kind)
 
 
 def large_system(nodes: int) -> str:
@@ -143,30 +119,20 @@ def large_system(nodes: int) -> str:
     return "\n".join(lines)
 
 
-def check_of(sizes: tuple[int, int], *mistakes: tuple[str, str]) -> Callable[[int], bool]:
-    """Return a function that checks the system of a size; it returns whether that is valid."""
+@pytest.mark.slow  # 2000 nodes
+@pytest.mark.parametrize(
+    ("small", "large", "mistakes"),
+    [(250, 2000, {}), (100, 800, {"type:": "typ:", "topic": "topc"})],
+    ids=["valid", "mistakes everywhere"],
+)
+def test_a_large_system_costs_no_more_than_in_proportion(
+    small: int, large: int, mistakes: dict[str, str]
+) -> None:
     trees = {}
-    for nodes in sizes:
+    for nodes in (small, large):
         text = large_system(nodes)
-        for right, wrong in mistakes:
+        for right, wrong in mistakes.items():
             text = text.replace(right, wrong)
         trees[nodes] = tree_of(text)
-
-    def check(nodes: int) -> bool:
-        return not check_schema(trees[nodes], "system")
-
-    return check
-
-
-@pytest.mark.slow  # 2000 nodes
-def test_a_large_system_costs_no_more_than_in_proportion() -> None:
-    check = check_of((250, 2000))
-    assert check(250)
-    assert_linear(check, 250, 2000)
-
-
-@pytest.mark.slow  # 800 nodes with mistakes
-def test_mistakes_everywhere_cost_no_more_than_in_proportion() -> None:
-    check = check_of((100, 800), ("type:", "typ:"), ("topic", "topc"))
-    assert not check(100)
-    assert_linear(check, 100, 800)
+    assert (check_schema(trees[small], "system") == []) is not bool(mistakes)
+    assert_linear(lambda nodes: check_schema(trees[nodes], "system"), small, large)

@@ -34,252 +34,236 @@ def profile(text: str) -> str:
     return f"system: demo\nnodes: {{robot: {{}}}}\nqos_profiles: {{scan: {text}}}"
 
 
-@pytest.mark.parametrize(
-    ("text", "rule", "mark", "message", "hint"),
-    [
-        # the file
-        ("system: demo", "missing-key", "system", "a system needs 'nodes' or 'in", "nodes: {"),
-        ("system: demo\nnodes: {}", "empty-collection", "nodes", "'nodes' is empty", "at least"),
-        (
-            "system: demo\nnodes: {a: {}}\nchains: {c: {through: [a.p], latency_ms: 5}}",
-            "empty-collection", "through", "'through' needs at least 2 entries, and has only 1",
-            "add 1",
-        ),
-        ("system: a\ninclude: []", "empty-collection", "include", "'include' is empty", "at least"),
-        (
-            "system: 5\nnodes: {robot: {}}",
-            "wrong-type", "5", "expected a string for 'system', found the number 5", "quote it",
-        ),
-        (
-            "system: a\nnodes: {robot: {namespace: [b, c]}}",
-            "wrong-type", "[", "expected a string for 'namespace', found a list", "write 'b/c'",
-        ),
-        (
-            "system: a\nnodes: {robot: {type: arm, parameters: {gains: {p: 1.0}}}}",
-            "wrong-type", "{", "expected true or false, a number", "with a dot: 'gains.p: ...'",
-        ),
-        (
-            "system: demo\nnodes:\n  - robot: {}",
-            "wrong-type", "robot", "expected a map for 'nodes', found a list", "without a dash",
-        ),
-        (
-            "system: demo\nnode: {robot: {}}\nnodes: {a: {}}",
-            "unknown-key", "node", "'node' is not a key of a system", "valid here: arguments",
-        ),
-        ("node: demo\nxyzzy: 1", "unknown-key", "xyzzy", "'xyzzy' is not a key of a node type", ""),
-        (
-            "node: demo\nvariables: 1",
-            "wrong-type", "1", "expected a map for 'variables', found the number 1", "",
-        ),
-        # nodes
-        (
-            node("{parameters: [robot.yaml]}"),
-            "wrong-type", "[", "expected a map for 'parameters'", "'parameter_files'",
-        ),
-        (
-            node("{type: relay, parameters: robot.yaml}"),
-            "wrong-type", "robot.yaml", "expected a map for 'parameters'", "'parameter_files'",
-        ),
-        (
-            node("{lifecycle: managed}"),
-            "wrong-type", "managed", "expected a map for 'lifecycle'", "write it in 'executable'",
-        ),
-        (
-            node("{executable: {command: [a], lifecycle: {depends_on: [b]}}}"),
-            "unknown-word", "{", "expected 'managed' or 'none' for 'lif", "next to 'executable'",
-        ),
-        (node(""), "wrong-type", "robot", "expected a map for 'robot', found nothing", "'{}'"),
-        (
-            node("{typ: relay, variables: {a: 1}, publishers: {a: {}}}"),
-            "unknown-key", "typ", "'typ' is not a key of inline node 'robot'", "mean 'type'?",
-        ),
-        (
-            node("{type: relay, behavior: a:B}"),
-            "unknown-key", "behavior", "'behavior' is not a key of node 'robot'", "remove it",
-        ),
-        (
-            node("{variables: {a: 1}}"),
-            "unknown-key", "variables", "'variables' is not a key of inline node", "with a 'type'",
-        ),
-        (
-            node("{subscribers: {scan: {}}}"),
-            "unknown-key", "subscribers", "'subscribers' is not a key", "mean 'subscriptions'?",
-        ),
-        (node("{topics: {}}"), "unknown-key", "topics", "'topics' is not a key", "'publishers'"),
-        (node("{params: {}}"), "unknown-key", "params", "'params' is not a key", "'parameters'?"),
-        (
-            node("{type: relay, parameters: {a: {default: 1}}}"),
-            "wrong-type", "{", "expected true or false, a number, a string or a list for 'a'", "",
-        ),
-        (
-            node("{parameters: {a: null}}"),
-            "wrong-type", "null", "expected a map, true or false, a number, a string or a list", "",
-        ),
-        (
-            node("{parameters: {a: {type: float}}}"),
-            "unknown-word", "float", "expected 'bool', 'integer', 'double'", "",
-        ),
+#: By rule: texts, what is marked (the first word of the message about a key), message and hint.
+MISTAKES: dict[str, list[tuple[str, ...]]] = {
+    "missing-key": [
+        ("system: demo", "system", "a system needs 'nodes' or 'in", "nodes: {"),
         (
             node("{parameters: {a: {default: 1}}}"),
-            "missing-key", "a", "parameter 'a' needs the key 'type'", "'type: double'",
+            "a", "parameter 'a' needs the key 'type'", "'type: double'",
         ),
-        (
-            node("{parameters: {a: {type: double, min: 0.0}}}"),
-            "unknown-key", "min", "'min' is not a key of parameter 'a'", "mean 'minimum'?",
-        ),
-        (
-            node("{parameters: {a: {type: bool, read_only: yes}}}"),
-            "wrong-type", "yes", "expected true or false for 'read_only'", "write true or false",
-        ),
-        (
-            node("{lifecycle: {depends_on: planner}}"),
-            "wrong-type", "planner", "expected a list or a map for 'depends_on'", "a list: [...]",
-        ),
-        (
-            node("{lifecycle: {depends_on: {planner: activ}}}"),
-            "unknown-word", "activ", "expected 'active' or 'inactive' for 'planner'", "'active'?",
-        ),
-        (
-            "system: demo\nnodes: {a: {}}\nexecutors: {b: {priority: 100}}",
-            "out-of-range", "100", "expected at most 99 for 'priority', found 100", "",
-        ),
-        (
-            "system: demo\nnodes: {a: {}}\nexecutors: {b: {cpus: [0, -1]}}",
-            "out-of-range", "-1", "expected at least 0", "",
-        ),
-        # ports
         (
             node("{publishers: {chatter: {topic: /a}}}"),
-            "missing-key", "chatter", "publisher 'chatter' needs the key 'type'", "/msg/",
+            "chatter", "publisher 'chatter' needs the key 'type'", "/msg/",
         ),
-        (
-            node("{clients: {plan: {}}}"),
-            "missing-key", "plan", "client 'plan' needs the key 'type'", "/srv/",
-        ),
+        (node("{clients: {plan: {}}}"), "plan", "client 'plan' needs the key 'type'", "/srv/"),
         (
             node("{action_servers: {go: {}}}"),
-            "missing-key", "go", "action server 'go' needs the key 'type'", "/action/",
-        ),
-        (
-            subscription("{message_type: a/msg/B}"),
-            "unknown-key", "message_type", "'message_type' is not a key", "mean 'type'?",
-        ),
-        (
-            subscription("{type: a/msg/B, qos: 10}"),
-            "wrong-type", "10", "expected a string or a map for 'qos', found the number 10", "",
-        ),
-        (
-            subscription("{type: a/msg/B, qos: {reliability: best-effort}}"),
-            "unknown-word", "best-effort", "expected 'reliable' or 'best_effort'", "'best_effort'?",
-        ),
-        (
-            subscription("{type: a/msg/B, callback: x}"),
-            "unknown-key", "callback", "'callback' is not a key of subscription 'scan'", "when,",
-        ),
-        (
-            subscription("{type: a/msg/B, when: true}"),
-            "wrong-type", "true", "expected a string for 'when', found true", "quote it",
-        ),
-        (
-            subscription("{type: a/msg/B, publish: {out: hello}}"),
-            "wrong-type", "hello", "expected a map or an '{expression}' for 'out'", "{data: ...}",
-        ),
-        (
-            subscription("{type: a/msg/B, log: {level: warning, message: x}}"),
-            "unknown-word", "warning", "expected 'debug', 'info', 'warn', 'error' or", "'warn'?",
+            "go", "action server 'go' needs the key 'type'", "/action/",
         ),
         (
             subscription("{type: a/msg/B, log: {level: warn}}"),
-            "missing-key", "log", "this log needs the key 'message'", "",
-        ),
-        (
-            node("{services: {s: {type: a/srv/B, when: x}}}"),
-            "unknown-key", "when", "'when' is not a key of service 's'", "every request",
+            "log", "this log needs the key 'message'", "",
         ),
         (
             node("{action_servers: {s: {type: a/action/B, feedback: {count: 3}}}}"),
-            "missing-key", "feedback", "this feedback needs the key 'period_ms'", "",
+            "feedback", "this feedback needs the key 'period_ms'", "",
         ),
-        # timers
-        (timer(""), "wrong-type", "tick", "expected a map for 'tick', found nothing", "'{}'"),
-        (timer("{}"), "missing-key", "tick", "timer 'tick' needs 'period_ms' or 'rate_hz'", ""),
-        (
-            timer("{rate_hz: 1, period_ms: 2}"),
-            "keys-exclude-each-other", "period_ms",
-            "timer 'tick' has both 'rate_hz' and 'period_ms'", "keep one",
-        ),
-        (
-            timer("{frequency: 10}"),
-            "unknown-key", "frequency", "'frequency' is not a key of timer 'tick'", "'rate_hz'?",
-        ),
-        (timer("{hz: 10}"), "unknown-key", "hz", "'hz' is not a key of timer", "'rate_hz'?"),
-        (timer("{period: 1}"), "unknown-key", "period", "'period' is not", "'period_ms'?"),
-        (
-            timer("{rate_hz: 10 Hz}"),
-            "wrong-type", "10 Hz", "expected a number or an '{expression}' for 'rate_hz'", "unit",
-        ),
-        (
-            timer("{rate_hz: 0}"),
-            "out-of-range", "0", "expected a number above 0 for 'rate_hz', found 0", "",
-        ),
-        (
-            timer("{rate_hz: true}"),
-            "wrong-type", "true", "expected a number or an '{expression}' for 'rate_hz'", "",
-        ),
-        # connections
-        (
-            connection("{topic: /a}"),
-            "missing-key", "{", "this topic connection needs 'from' or 'to'", "",
-        ),
+        (timer("{}"), "tick", "timer 'tick' needs 'period_ms' or 'rate_hz'", ""),
+        (connection("{topic: /a}"), "{", "this topic connection needs 'from' or 'to'", ""),
         (
             connection("{service: /a}"),
-            "missing-key", "{", "this service connection needs 'server' or 'clients'", "",
+            "{", "this service connection needs 'server' or 'clients'", "",
         ),
         (
             connection("{from: a.b, to: c.d}"),
-            "missing-key", "{", "this connection needs 'topic', 'service' or 'action'", "",
+            "{", "this connection needs 'topic', 'service' or 'action'", "",
+        ),
+    ],
+    "empty-collection": [
+        ("system: demo\nnodes: {}", "nodes", "'nodes' is empty", "at least"),
+        (
+            "system: demo\nnodes: {a: {}}\nchains: {c: {through: [a.p], latency_ms: 5}}",
+            "through", "'through' needs at least 2 entries, and has only 1", "add 1",
+        ),
+        ("system: a\ninclude: []", "include", "'include' is empty", "at least"),
+        (connection("{topic: /a, from: a.b, to: []}"), "to", "'to' is empty", "at least one"),
+    ],
+    "wrong-type": [
+        (
+            "system: 5\nnodes: {robot: {}}",
+            "5", "expected a string for 'system', found the number 5", "quote it",
         ),
         (
-            connection("{topc: /a, from: a.b, to: []}"),
-            "unknown-key", "topc", "'topc' is not a key of this connection", "mean 'topic'?",
+            "system: a\nnodes: {robot: {namespace: [b, c]}}",
+            "[", "expected a string for 'namespace', found a list", "write 'b/c'",
         ),
         (
-            connection("{topic: /a, source: a.b}"),
-            "unknown-key", "source", "'source' is not a key of this topic connection", "'from'?",
+            "system: a\nnodes: {robot: {type: arm, parameters: {gains: {p: 1.0}}}}",
+            "{", "expected true or false, a number", "with a dot: 'gains.p: ...'",
         ),
         (
-            connection("{service: /a, from: a.b}"),
-            "unknown-key", "from", "'from' is not a key of this service connection", "'server'?",
+            "system: demo\nnodes:\n  - robot: {}",
+            "robot", "expected a map for 'nodes', found a list", "without a dash",
+        ),
+        ("node: demo\nvariables: 1", "1", "expected a map for 'variables', found the number 1", ""),
+        (
+            node("{parameters: [robot.yaml]}"),
+            "[", "expected a map for 'parameters'", "'parameter_files'",
         ),
         (
-            connection("{topic: /a, from: a.b, to: []}"),
-            "empty-collection", "to", "'to' is empty", "at least one",
+            node("{type: relay, parameters: robot.yaml}"),
+            "robot.yaml", "expected a map for 'parameters'", "'parameter_files'",
+        ),
+        (
+            node("{lifecycle: managed}"),
+            "managed", "expected a map for 'lifecycle'", "write it in 'executable'",
+        ),
+        (node(""), "robot", "expected a map for 'robot', found nothing", "'{}'"),
+        (
+            node("{type: relay, parameters: {a: {default: 1}}}"),
+            "{", "expected true or false, a number, a string or a list for 'a'", "",
+        ),
+        (
+            node("{parameters: {a: null}}"),
+            "null", "expected a map, true or false, a number, a string or a list", "",
+        ),
+        (
+            node("{parameters: {a: {type: bool, read_only: yes}}}"),
+            "yes", "expected true or false for 'read_only'", "write true or false",
+        ),
+        (
+            node("{lifecycle: {depends_on: planner}}"),
+            "planner", "expected a list or a map for 'depends_on'", "a list: [...]",
+        ),
+        (
+            subscription("{type: a/msg/B, qos: 10}"),
+            "10", "expected a string or a map for 'qos', found the number 10", "",
+        ),
+        (
+            subscription("{type: a/msg/B, when: true}"),
+            "true", "expected a string for 'when', found true", "quote it",
+        ),
+        (
+            subscription("{type: a/msg/B, publish: {out: hello}}"),
+            "hello", "expected a map or an '{expression}' for 'out'", "{data: ...}",
+        ),
+        (timer(""), "tick", "expected a map for 'tick', found nothing", "'{}'"),
+        (
+            timer("{rate_hz: 10 Hz}"),
+            "10 Hz", "expected a number or an '{expression}' for 'rate_hz'", "unit",
+        ),
+        (
+            timer("{rate_hz: true}"),
+            "true", "expected a number or an '{expression}' for 'rate_hz'", "",
         ),
         (
             connection("{topic: /a, from: a.b, to: [3]}"),
-            "wrong-type", "3", "expected a string in 'to', found the number 3", "",
+            "3", "expected a string in 'to', found the number 3", "",
+        ),
+        (connection("/a"), "/a", "expected a map in 'connections', found the string '/a'", ""),
+        (profile("{depth: 1.0}"), "1.0", "expected an integer for 'depth'", ""),
+        (profile("sensor_data"), "sensor_data", "expected a map for 'scan'", ""),
+    ],
+    "unknown-key": [
+        (
+            "system: demo\nnode: {robot: {}}\nnodes: {a: {}}",
+            "'node' is not a key of a system", "valid here: arguments",
+        ),
+        ("node: demo\nxyzzy: 1", "'xyzzy' is not a key of a node type", ""),
+        (
+            node("{typ: relay, variables: {a: 1}, publishers: {a: {}}}"),
+            "'typ' is not a key of inline node 'robot'", "mean 'type'?",
         ),
         (
-            connection("/a"),
-            "wrong-type", "/a", "expected a map in 'connections', found the string '/a'", "",
+            node("{type: relay, behavior: a:B}"),
+            "'behavior' is not a key of node 'robot'", "remove it",
         ),
-        # profiles and executors
-        (profile("{depth: 0}"), "out-of-range", "0", "expected at least 1 for 'depth'", ""),
-        (profile("{depth: 1.0}"), "wrong-type", "1.0", "expected an integer for 'depth'", ""),
+        (node("{variables: {a: 1}}"), "'variables' is not a key of inline node", "with a 'type'"),
+        (node("{subscribers: {scan: {}}}"), "'subscribers' is not a key", "mean 'subscriptions'?"),
+        (node("{topics: {}}"), "'topics' is not a key", "'publishers'"),
+        (node("{params: {}}"), "'params' is not a key", "'parameters'?"),
         (
-            profile("{deadline_ms: 0}"),
-            "out-of-range", "0", "expected a number above 0 for 'deadline_ms', found 0", "",
+            node("{parameters: {a: {type: double, min: 0.0}}}"),
+            "'min' is not a key of parameter 'a'", "mean 'minimum'?",
         ),
-        (profile("{deadline: 5}"), "unknown-key", "deadline", "'deadline' is", "'deadline_ms'?"),
-        (profile("{queue_size: 5}"), "unknown-key", "queue_size", "'queue_size'", "'depth'?"),
-        (profile("sensor_data"), "wrong-type", "sensor_data", "expected a map for 'scan'", ""),
+        (subscription("{message_type: a/msg/B}"), "'message_type' is not a key", "mean 'type'?"),
+        (
+            subscription("{type: a/msg/B, callback: x}"),
+            "'callback' is not a key of subscription 'scan'", "when,",
+        ),
+        (
+            node("{services: {s: {type: a/srv/B, when: x}}}"),
+            "'when' is not a key of service 's'", "every request",
+        ),
+        (timer("{frequency: 10}"), "'frequency' is not a key of timer 'tick'", "'rate_hz'?"),
+        (timer("{hz: 10}"), "'hz' is not a key of timer", "'rate_hz'?"),
+        (timer("{period: 1}"), "'period' is not", "'period_ms'?"),
+        (
+            connection("{topc: /a, from: a.b, to: []}"),
+            "'topc' is not a key of this connection", "mean 'topic'?",
+        ),
+        (
+            connection("{topic: /a, source: a.b}"),
+            "'source' is not a key of this topic connection", "'from'?",
+        ),
+        (
+            connection("{service: /a, from: a.b}"),
+            "'from' is not a key of this service connection", "'server'?",
+        ),
+        (profile("{deadline: 5}"), "'deadline' is", "'deadline_ms'?"),
+        (profile("{queue_size: 5}"), "'queue_size'", "'depth'?"),
+    ],
+    "unknown-word": [
+        (
+            node("{executable: {command: [a], lifecycle: {depends_on: [b]}}}"),
+            "{", "expected 'managed' or 'none' for 'lif", "next to 'executable'",
+        ),
+        (
+            node("{parameters: {a: {type: float}}}"),
+            "float", "expected 'bool', 'integer', 'double'", "",
+        ),
+        (
+            node("{lifecycle: {depends_on: {planner: activ}}}"),
+            "activ", "expected 'active' or 'inactive' for 'planner'", "'active'?",
+        ),
+        (
+            subscription("{type: a/msg/B, qos: {reliability: best-effort}}"),
+            "best-effort", "expected 'reliable' or 'best_effort'", "'best_effort'?",
+        ),
+        (
+            subscription("{type: a/msg/B, log: {level: warning, message: x}}"),
+            "warning", "expected 'debug', 'info', 'warn', 'error' or", "'warn'?",
+        ),
         (
             "system: demo\nnodes: {a: {}}\nexecutors: {b: {kind: multithreaded}}",
-            "unknown-word", "multithreaded", "expected 'events', 'single_threaded' or", "",
+            "multithreaded", "expected 'events', 'single_threaded' or", "",
         ),
     ],
-)  # fmt: skip
-def test_diagnostic(text: str, rule: str, mark: str, message: str, hint: str) -> None:
+    "out-of-range": [
+        (
+            "system: demo\nnodes: {a: {}}\nexecutors: {b: {priority: 100}}",
+            "100", "expected at most 99 for 'priority', found 100", "",
+        ),
+        (
+            "system: demo\nnodes: {a: {}}\nexecutors: {b: {cpus: [0, -1]}}",
+            "-1", "expected at least 0", "",
+        ),
+        (timer("{rate_hz: 0}"), "0", "expected a number above 0 for 'rate_hz', found 0", ""),
+        (profile("{depth: 0}"), "0", "expected at least 1 for 'depth'", ""),
+        (
+            profile("{deadline_ms: 0}"),
+            "0", "expected a number above 0 for 'deadline_ms', found 0", "",
+        ),
+    ],
+    "keys-exclude-each-other": [
+        (
+            timer("{rate_hz: 1, period_ms: 2}"),
+            "period_ms", "timer 'tick' has both 'rate_hz' and 'period_ms'", "keep one",
+        ),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "mark", "message", "hint"),
+    [
+        (rule, text, *(mark or [message.split("'")[1]]), message, hint)
+        for rule, cases in MISTAKES.items()
+        for text, *mark, message, hint in cases
+    ],
+)
+def test_diagnostic(rule: str, text: str, mark: str, message: str, hint: str) -> None:
     (diagnostic,) = diagnostics_in(text)
     assert (diagnostic.rule.name, quoted(diagnostic.primary)) == (rule, mark)
     assert diagnostic.message.startswith(message)
@@ -308,28 +292,20 @@ def test_two_keys_that_say_the_same_are_both_shown() -> None:
         connection("{topic: /a, from: a.b}, {topic: /a, to: [a.b, c.d], qos: state}"),
         connection("{service: /a, server: a.b}, {action: /a, clients: [a.b]}"),
         "node: relay\nvariables: {a: {}, b: {description: x, default: null}}",
-    ],
-)
-def test_what_is_right(text: str) -> None:
-    assert [diagnostic.message for diagnostic in diagnostics_in(text)] == []
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
+        # A variable without a value fits everywhere.
         timer("{rate_hz: '${rate}', reentrant: '${flag}'}"),
         profile("{depth: '${depth}', reliability: '${reliability}', lifespan_ms: '${ms}'}"),
         subscription("{type: '${type}', qos: '${qos}', required: '${flag}', publish: {a: '${b}'}}"),
         node("{type: '${type}', lifecycle: {depends_on: '${nodes}', autostart: '${state}'}}"),
         node("{parameters: {a: {type: '${type}', minimum: '${low}', choices: '${list}'}}}"),
         node("{action_servers: {a: {type: x, feedback: {count: '${n}', period_ms: '${ms}'}}}}"),
-        node("{clients: {a: {type: x, timeout_ms: '${ms}', on_response: {log: {level: '${l}', "
-             "message: x}}}}}"),
+        node("{clients: {a: {type: x, timeout_ms: '${ms}'}}}"),
+        node("{on_activate: {log: {level: '${l}', message: x}}}"),
         connection("{topic: '${topic}', from: '${ends}', qos: '${qos}'}"),
         "system: demo\nnodes: {a: {}}\nexecutors: {b: {kind: '${kind}', threads: '${threads}'}}",
     ],
-)  # fmt: skip
-def test_variable_without_value_fits_everywhere(text: str) -> None:
+)
+def test_what_is_right(text: str) -> None:
     assert [diagnostic.message for diagnostic in diagnostics_in(text)] == []
 
 
@@ -360,19 +336,11 @@ def test_all_mistakes_in_one_run() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("text", "kind"),
-    [
-        ("system: a", "system"),
-        ("node: a", "node"),
-        ("description: x\nnode: a", "node"),
-        ("node: a\nsystem: b", "node"),
-        ("nodes: {}", None),
-        ("a: {system: b}", None),
-    ],
-)
-def test_kind(text: str, kind: str | None) -> None:
-    assert kind_of(tree_of(text)) == kind
+def test_kind() -> None:
+    texts = ("system: a", "node: a", "description: x\nnode: a", "node: a\nsystem: b")
+    assert [kind_of(tree_of(text)) for text in texts] == ["system", "node", "node", "node"]
+    for text in ("nodes: {}", "a: {system: b}"):
+        assert kind_of(tree_of(text)) is None
 
 
 def test_long_and_hostile_keys_are_cut_and_escaped() -> None:
