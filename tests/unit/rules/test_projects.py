@@ -1,4 +1,4 @@
-"""Small projects in ``projects.yaml``: each mistake is reported once, where it is."""
+"""Small projects: each mistake is reported once, where it is. Most are in ``projects.yaml``."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import yaml
 from composer.base.diagnostics import Severity
 from composer.loading import load, load_files
 from composer.loading.reported import collect_diagnostics, project_diagnostics
+from tests.unit.interfaces.test_index import package, prefix
 from tests.unit.support.checking import (
     diagnostics_in,
     diagnostics_of_each,
-    rules_broken,
+    load_project,
+    places,
     write_files,
 )
 
@@ -32,19 +34,15 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
         | {name: text for name, text in project.items() if name not in ("name", "found")}
         for project in PROJECTS
     ]
-    return {
-        project["name"]: [
-            f"{item.primary.file.path}:{item.primary.line} {item.rule.name}".removeprefix(
-                f"{folder / str(index)}/"
-            )
-            .removeprefix("system.yaml:")
-            .replace(f"_{index}.py", ".py")
-            for item in found
+    found = {}
+    for index, diagnostics in enumerate(diagnostics_of_each(files, folder)):
+        lines = [f"{item.primary.file.path}:{item.primary.line}" for item in diagnostics]
+        found[PROJECTS[index]["name"]] = [
+            f"{line.removeprefix(f'{folder / str(index)}/').removeprefix('system.yaml:')} "
+            f"{item.rule.name}".replace(f"_{index}.py", ".py")
+            for line, item in zip(lines, diagnostics, strict=True)
         ]
-        for index, (project, found) in enumerate(
-            zip(PROJECTS, diagnostics_of_each(files, folder), strict=True)
-        )
-    }
+    return found
 
 
 @pytest.mark.parametrize("project", PROJECTS, ids=[project["name"] for project in PROJECTS])
@@ -52,31 +50,37 @@ def test_diagnostics(project: dict[str, Any], reported: dict[str, list[str]]) ->
     assert reported[project["name"]] == project["found"]
 
 
-def test_a_node_type_alone_needs_no_connections(tmp_path: Path) -> None:
-    text = (
-        "node: relay\nvariables: {message_type: {description: The type.}}\n"
-        "parameters: {rate_hz: {type: double}}\n"
-        "subscriptions:\n"
-        "  input: {type: '${message_type}', qos: command, publish: {output: '{message}'}}\n"
-        "publishers: {output: {type: '${message_type}', qos: command}}\n"
-    )
-    write_files(tmp_path, {"relay.yaml": text})
-    assert load(tmp_path / "relay.yaml").diagnostics == []
+def test_a_node_type_alone_needs_no_connections_and_no_profiles(tmp_path: Path) -> None:
+    repeater = """\
+node: repeater
+variables: {message_type: {description: The type.}}
+parameters: {rate_hz: {type: double}}
+subscriptions:
+  input: {type: '${message_type}', qos: command, publish: {output: '{message}'}}
+publishers: {output: {type: '${message_type}', qos: %s}}
+"""
+    assert load_project(tmp_path, {"repeater.yaml": repeater % "command"}).diagnostics == []
+    assert load_project(tmp_path, {"nodes/repeater.yaml": repeater % "images"}).diagnostics == []
+    # The systems that use it declare the profiles.
+    node = "{type: repeater, variables: {message_type: std_msgs/msg/String}, "
+    node += "parameters: {rate_hz: 1.0}, subscriptions: {input: {external: true}}, "
+    system = f"system: demo\nnodes:\n  one: {node}publishers: {{output: {{external: true}}}}}}\n"
+    profiles = "qos_profiles: {images: {depth: 1}}\n"
+    assert load_project(tmp_path, {"demo.yaml": system + profiles}).diagnostics == []
+    [diagnostic] = load_project(tmp_path, {"demo.yaml": system}).diagnostics
+    assert diagnostic.rule.name == "undeclared-name"
 
 
 def test_all_uses_of_a_renamed_field_are_labels_of_one_diagnostic(tmp_path: Path) -> None:
-    write_files(
-        tmp_path,
-        {
-            "interfaces/demo_msgs/msg/Zone.msg": "string area\n",
-            "interfaces/demo_msgs/package.xml": "<package><name>demo_msgs</name></package>",
-            "composer.yaml": "interfaces: [interfaces]\n",
-        },
-    )
     port = "type: demo_msgs/msg/Zone, qos: state, external: true"
     log = 'log: "{message.zone}", when: message.zone != ""'
-    text = f"system: demo\nnodes:\n  a: {{subscriptions: {{zone: {{{port}, {log}}}}}}}\n"
-    [found] = diagnostics_in(text, tmp_path)
+    files = {
+        "a.yaml": f"system: demo\nnodes:\n  a: {{subscriptions: {{zone: {{{port}, {log}}}}}}}\n",
+        "interfaces/demo_msgs/msg/Zone.msg": "string area\n",
+        "interfaces/demo_msgs/package.xml": "<package><name>demo_msgs</name></package>",
+        "composer.yaml": "interfaces: [interfaces]\n",
+    }
+    [found] = load_project(tmp_path, files).diagnostics
     assert found.message == "demo_msgs/msg/Zone has no field 'zone'"
     assert [label.message for label in found.related] == ["here too"]
 
@@ -141,34 +145,15 @@ def test_a_wrong_value_of_a_loop_is_reported_once(
     assert (found.rule.name, found.primary.text) == (rule, text)
 
 
-def test_a_type_that_contradicts_the_class_is_reported_once(tmp_path: Path) -> None:
-    (tmp_path / "camera.py").write_text(
-        "from rclpy.node import Node\nfrom std_msgs.msg import String\n\n\nclass Camera(Node):\n"
-        "    def __init__(self):\n        super().__init__('camera')\n"
-        "        self.create_publisher(String, 'text', 10)\n",
-        encoding="utf-8",
-    )
-    text = (
-        "system: demo\nnodes:\n"
-        "  camera: {class: 'camera:Camera', publishers: {text: {type: std_msgs/msg/Int32}}}\n"
-        "  sink: {subscriptions: {text: {type: std_msgs/msg/String, log: a}}}\n"
-    )
-    assert "class-port" in rules_broken(text, tmp_path)
-    assert "type-mismatch" not in rules_broken(text, tmp_path)
-
-
 def test_a_package_that_is_missing_is_reported_once_with_all_uses(tmp_path: Path) -> None:
-    (tmp_path / "drive.py").write_text(
-        "from arm_msgs.msg import Grip\nfrom arm_msgs.srv import Move\n\n\nclass Drive:\n"
-        "    def on_grip(self, message):\n        print(Grip, Move)\n",
-        encoding="utf-8",
-    )
-    text = (
-        "system: demo\nnodes:\n  drive:\n    behavior: drive:Drive\n    subscriptions:\n"
+    files = {
+        "a.yaml": "system: demo\nnodes:\n  drive:\n    behavior: drive:Drive\n    subscriptions:\n"
         "      grip: {type: arm_msgs/msg/Grip, qos: command, external: true}\n"
-        "    clients: {move: {type: arm_msgs/srv/Move, external: true}}\n"
-    )
-    [found] = diagnostics_in(text, tmp_path)
+        "    clients: {move: {type: arm_msgs/srv/Move, external: true}}\n",
+        "drive.py": "from arm_msgs.msg import Grip\nfrom arm_msgs.srv import Move\n\n\n"
+        "class Drive:\n    def on_grip(self, message):\n        print(Grip, Move)\n",
+    }
+    [found] = load_project(tmp_path, files).diagnostics
     assert len(found.related) >= len(["the other import", "the port", "the client"])
 
 
@@ -176,17 +161,15 @@ def test_a_package_that_is_missing_is_reported_once_with_all_uses(tmp_path: Path
 def test_a_missing_package_of_a_port_is_an_error_in_files_of_any_name(
     module: str, tmp_path: Path
 ) -> None:
-    code = (
-        "from rclpy.node import Node\nfrom turtlesim.msg import Pose\n\n\nclass Turtle(Node):\n"
-        "    def __init__(self):\n        super().__init__('turtle')\n"
-        "        self.create_subscription(Pose, 'pose', print, 10)\n"
-    )
-    (tmp_path / f"{module}.py").write_text(code, encoding="utf-8")
-    text = (
-        f"system: demo\nnodes:\n  turtle:\n    class: {module}:Turtle\n    subscriptions:\n"
-        "      pose: {type: turtlesim/msg/Pose, external: true}\n"
-    )
-    found = max(diagnostics_in(text, tmp_path), key=lambda item: item.severity is Severity.ERROR)
+    files = {
+        "system.yaml": f"system: demo\nnodes:\n  turtle:\n    class: {module}:Turtle\n"
+        "    subscriptions: {pose: {type: turtlesim/msg/Pose, external: true}}\n",
+        f"{module}.py": "from rclpy.node import Node\nfrom turtlesim.msg import Pose\n\n\n"
+        "class Turtle(Node):\n    def __init__(self):\n        super().__init__('turtle')\n"
+        "        self.create_subscription(Pose, 'pose', print, 10)\n",
+    }
+    diagnostics = load_project(tmp_path, files).diagnostics
+    [found] = [item for item in diagnostics if item.severity is Severity.ERROR]
     assert found.rule.name == "unknown-interface"
     assert found.hint == (
         "install the package 'turtlesim', or put its source into the folder 'interfaces'; "
@@ -195,13 +178,86 @@ def test_a_missing_package_of_a_port_is_an_error_in_files_of_any_name(
 
 
 def test_a_missing_folder_of_node_types_is_a_warning(tmp_path: Path) -> None:
-    (tmp_path / "composer.yaml").write_text("nodes: [node_types]\n", encoding="utf-8")
-    (tmp_path / "node_type").mkdir()
-    (tmp_path / "node_type" / "motor.yaml").write_text("node: motor\non_activate: {log: x}\n")
-    (tmp_path / "system.yaml").write_text("system: demo\nnodes: {motor: {type: motor}}\n")
-    (tmp_path / "other.yaml").write_text("system: demo\nnodes: {motor: {on_activate: {log: x}}}\n")
+    files = {
+        "other.yaml": "system: demo\nnodes: {motor: {on_activate: {log: x}}}\n",
+        "system.yaml": "system: demo\nnodes: {motor: {type: motor}}\n",
+        "composer.yaml": "nodes: [node_types]\n",
+        "node_type/motor.yaml": "node: motor\non_activate: {log: x}\n",
+    }
+    [warning] = load_project(tmp_path, files).diagnostics
+    assert (warning.severity, warning.hint) == (Severity.WARNING, "did you mean 'node_type'?")
     results = load_files([tmp_path / "system.yaml", tmp_path / "node_type" / "motor.yaml"])
     found = [*collect_diagnostics(results), *project_diagnostics(results)]
     assert [item.rule.name for item in found] == ["bad-setting", "unknown-node-type"]
-    [warning] = load(tmp_path / "other.yaml").diagnostics
-    assert (warning.severity, warning.hint) == (Severity.WARNING, "did you mean 'node_type'?")
+
+
+PLANNERS = {
+    "nodes/planner.yaml": "node: planner\non_activate: {log: ready}\n",
+    "nodes/old_planner.yaml": "node: old_planner\non_activate: {log: ready}\n",
+    "systems/pipeline.yaml": "system: pipeline\nnodes: {planner: {type: planner}}\n",
+}
+COMMENT = "# compose: ignore[unused-declaration] for other projects\n"
+
+
+@pytest.mark.parametrize(
+    ("changed", "loaded", "expected"),
+    [
+        pytest.param({}, [*PLANNERS], ["nodes/old_planner.yaml:1:7"], id="unused"),
+        pytest.param(
+            {"nodes/old_planner.yaml": "node: {old: planner}\n"}, [*PLANNERS], [], id="wrong name"
+        ),
+        pytest.param({}, [*PLANNERS][:2], [], id="without a system"),
+        pytest.param(
+            {"other/nodes/planner.yaml": PLANNERS["nodes/planner.yaml"]},
+            ["other/nodes/planner.yaml", "systems/pipeline.yaml"],
+            ["other/nodes/planner.yaml:1:7"],
+            id="the same name elsewhere",
+        ),
+        pytest.param(
+            {"nodes/old_planner.yaml": COMMENT + PLANNERS["nodes/old_planner.yaml"]},
+            [*PLANNERS],
+            [],
+            id="ignored",
+        ),
+    ],
+)
+def test_a_node_type_that_no_system_uses_is_reported(
+    changed: dict[str, str],
+    loaded: list[str],
+    expected: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    write_files(tmp_path, PLANNERS | changed)
+    monkeypatch.chdir(tmp_path)
+    found = project_diagnostics([load(Path(name)) for name in loaded])
+    assert places(found) == [f"{place} unused-declaration" for place in expected]
+
+
+@pytest.mark.parametrize(
+    ("files", "command"),
+    [([], "compose interface build arm_interfaces   or: "), (["pyproject.toml"], "pip install ")],
+)
+def test_an_interface_that_has_changed_since_it_was_built_is_an_error_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: list[str], command: str
+) -> None:
+    system = """\
+system: demo
+nodes:
+  hand:
+    publishers: {grip: {type: arm_interfaces/msg/Grip, qos: command, external: true}}
+    subscriptions: {want: {type: arm_interfaces/msg/Grip, qos: command, external: true, log: x}}
+"""
+    source = package(tmp_path / "interfaces" / "arm", "arm_interfaces", msg_Grip="float64 force")
+    for name in files:
+        (source / name).touch()
+    prefix(tmp_path / "install", "arm_interfaces", msg_Grip="float32 force")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    [diagnostic] = load_project(tmp_path, {"demo.yaml": system}).diagnostics
+    assert diagnostic.rule.name == "outdated-interface"
+    assert diagnostic.message == (
+        "'arm_interfaces/msg/Grip' has changed since the package 'arm_interfaces' was built"
+    )
+    assert (diagnostic.hint or "").startswith(command)
+    (source / "msg" / "Grip.msg").write_text("float32 force # in newtons")
+    assert load(tmp_path / "demo.yaml").diagnostics == []
