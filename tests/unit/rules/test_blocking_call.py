@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from composer.python_code.trees import Function
 from composer.rules.behaviors import endless_loops
 from tests.unit.support.checking import diagnostics_in, diagnostics_of_each
 
@@ -69,38 +68,27 @@ def test_a_call_reached_by_two_handlers_is_reported_once(tmp_path: Path) -> None
     assert diagnostic.primary.line == 9
 
 
-def function(body: str) -> Function:
+@pytest.mark.parametrize(
+    ("body", "lines"),
+    [
+        ("while True:\n    a = 1", [2]),
+        ("while 1:\n    pass", [2]),
+        ("while not self.ready:\n    pass", [2]),
+        ("while not goal.is_cancel_requested:\n    a = 1", [2]),
+        ("while True:\n    def g():\n        return 1", [2]),
+        # Loops that end or wait.
+        ("while True:\n    await a", []),
+        ("while True:\n    break", []),
+        ("while True:\n    return", []),
+        ("while True:\n    if a:\n        raise E", []),
+        ("while True:\n    async with a:\n        pass", []),
+        ("while True:\n    yield 1", []),
+        ("while a < b:\n    a += 1", []),
+        ("while not await a:\n    pass", []),
+        ("while True:\n    self.queue.get()", []),
+    ],
+)
+def test_endless_loops(body: str, lines: list[int]) -> None:
     text = "async def f():\n" + "".join(f"    {line}\n" for line in body.split("\n"))
-    [found] = ast.parse(text).body
-    assert isinstance(found, Function)
-    return found
-
-
-ENDLESS = [
-    "while True:\n    a = 1",
-    "while 1:\n    pass",
-    "while not self.ready:\n    pass",
-    "while not goal.is_cancel_requested:\n    a = 1",
-    "while True:\n    def g():\n        return 1",
-]
-ENDING = [
-    "while True:\n    await a",
-    "while True:\n    break",
-    "while True:\n    return",
-    "while True:\n    if a:\n        raise E",
-    "while True:\n    async with a:\n        pass",
-    "while True:\n    yield 1",
-    "while a < b:\n    a += 1",
-    "while not await a:\n    pass",
-    "while True:\n    self.queue.get()",
-]
-
-
-@pytest.mark.parametrize("body", ENDLESS)
-def test_endless_loops(body: str) -> None:
-    assert [loop.lineno for loop in endless_loops(function(body))] == [2]
-
-
-@pytest.mark.parametrize("body", ENDING)
-def test_loops_that_end_or_wait(body: str) -> None:
-    assert list(endless_loops(function(body))) == []
+    [function] = ast.parse(text).body
+    assert [loop.lineno for loop in endless_loops(function)] == lines

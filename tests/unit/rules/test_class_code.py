@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Severity
-from tests.unit.support.checking import diagnostics_in, diagnostics_of_each, quoted
+from tests.unit.support.checking import diagnostics_of_each, load_project, quoted
 from tests.unit.support.statements import Statements, diagnostics_of
 
 CLASS = Statements.read("class")
@@ -18,9 +18,13 @@ def _found(tmp_path: Path, *codes: str) -> list[list[tuple[str, str]]]:
     return [[(item.rule.name, quoted(item)) for item in found] for found in results]
 
 
-def test_a_constructor_calls_that_of_node(tmp_path: Path) -> None:
-    code = CLASS.code_with().replace('super().__init__("robot")', "pass")
-    assert ("missing-constructor", "__init__") in _found(tmp_path, code)[0]
+def test_a_constructor_calls_that_of_node_and_a_transition_gets_the_state(tmp_path: Path) -> None:
+    code = CLASS.code_with()
+    no_call = code.replace('super().__init__("robot")', "pass")
+    no_state = code.replace("def on_activate(self, state)", "def on_activate(self)")
+    first, second = _found(tmp_path, no_call, no_state)
+    assert ("missing-constructor", "__init__") in first
+    assert second == [("handler-signature", "on_activate")]
 
 
 def test_functions_may_have_attributes(tmp_path: Path) -> None:
@@ -29,26 +33,22 @@ def test_functions_may_have_attributes(tmp_path: Path) -> None:
     assert _found(tmp_path, "from functools import cache\n" + code) == [[]]
 
 
-@pytest.mark.parametrize(
-    ("returned", "method"),
-    [
-        ("return response", "on_reset"),
-        ("return Fibonacci.Result(sequence=[1])", "on_goal"),
-        ("return TransitionCallbackReturn.SUCCESS", "on_activate"),
-    ],
-)
-def test_a_callback_returns_a_result(returned: str, method: str, tmp_path: Path) -> None:
+RETURNED = {
+    "on_reset": "return response",
+    "on_goal": "return Fibonacci.Result(sequence=[1])",
+    "on_activate": "return TransitionCallbackReturn.SUCCESS",
+}
+
+
+def test_a_callback_returns_a_result(tmp_path: Path) -> None:
     code = CLASS.code_with()
     codes = [
-        code.replace(returned, text) for text in ("pass", "if self.count:\n            " + returned)
+        code.replace(returned, text)
+        for returned in RETURNED.values()
+        for text in ("pass", f"if self.count:\n            {returned}")
     ]
-    for [item] in diagnostics_of(CLASS.system, codes, tmp_path):
-        assert (item.rule.name, quoted(item)) == ("missing-return", method)
-
-
-def test_a_transition_gets_the_state(tmp_path: Path) -> None:
-    code = CLASS.code_with().replace("def on_activate(self, state)", "def on_activate(self)")
-    assert _found(tmp_path, code) == [[("handler-signature", "on_activate")]]
+    expected = [[("missing-return", method)] for method in RETURNED for _ in range(2)]
+    assert _found(tmp_path, *codes) == expected
 
 
 DECLARING = """\
@@ -74,12 +74,10 @@ class Declaring(Node):
 """
 
 
-PUBLISHED = (
-    "publishers: {text: {type: std_msgs/msg/String, topic: ~/text, qos: %s, external: true}}"
-)
+PUBLISHED = "publishers: {text: {type: std_msgs/msg/String, topic: ~/text%s}}"
 
 
-#: Lines of a node, and the rules about its class that they break.
+#: Lines of a node, and whether one contradicts its class.
 DECLARED: list[tuple[str, list[str]]] = [
     ("parameters: {offset: {type: double, default: 1.0}}", []),
     ("parameters: {offset: {type: integer, default: 1}}", ["class-parameter"]),
@@ -89,23 +87,19 @@ DECLARED: list[tuple[str, list[str]]] = [
     ("parameters: {arm.length: {type: double, default: 1.0}}", []),
     ("parameters: {length: {type: double, default: 1.0}}", ["class-parameter"]),
     ("parameters: {use_sim_time: {type: bool, default: true}}", []),
-    ("publishers: {text: {type: std_msgs/msg/String, topic: ~/text, external: true}}", []),
-    ("publishers: {text: {type: std_msgs/msg/Int32, topic: ~/text, external: true}}",
-     ["class-port"]),
-    ("publishers: {text: {type: std_msgs/msg/Int32, topic: text, external: true}}", []),
-    (PUBLISHED % "command", []),
-    (PUBLISHED % "{extends: command, lifespan_ms: 100}", []),
-    (PUBLISHED % "{extends: command, depth: 1}", []),
-    (PUBLISHED % "{extends: command, deadline_ms: 100}", ["class-port"]),
-    (PUBLISHED % "state", ["class-port"]),
-    ("subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data, external: true}}",
-     []),
-    ("subscriptions: {scan: {type: std_msgs/msg/String, qos: command, external: true}}",
-     ["class-port"]),
-    ("subscriptions: {fast: {type: std_msgs/msg/String, qos: state, external: true}}",
-     ["class-port"]),
-    ("subscriptions: {any: {type: std_msgs/msg/String, qos: state, external: true}}", []),
-]  # fmt: skip
+    ("publishers: {text: {type: std_msgs/msg/Int32, topic: ~/text}}", ["class-port"]),
+    ("publishers: {text: {type: std_msgs/msg/Int32, topic: text}}", []),
+    (PUBLISHED % "", []),
+    (PUBLISHED % ", qos: command", []),
+    (PUBLISHED % ", qos: {extends: command, lifespan_ms: 100}", []),
+    (PUBLISHED % ", qos: {extends: command, depth: 1}", []),
+    (PUBLISHED % ", qos: {extends: command, deadline_ms: 100}", ["class-port"]),
+    (PUBLISHED % ", qos: state", ["class-port"]),
+    ("subscriptions: {scan: {type: std_msgs/msg/String, qos: sensor_data}}", []),
+    ("subscriptions: {scan: {type: std_msgs/msg/String, qos: command}}", ["class-port"]),
+    ("subscriptions: {fast: {type: std_msgs/msg/String, qos: state}}", ["class-port"]),
+    ("subscriptions: {any: {type: std_msgs/msg/String, qos: state}}", []),
+]
 
 
 def test_parameters_and_ports_agree_with_the_class(tmp_path: Path) -> None:
@@ -127,15 +121,13 @@ def test_another_qos_is_a_warning_if_another_end_does_not_match(
 ) -> None:
     port = f"type: std_msgs/msg/String, topic: /text, qos: {qos}"
     system = (
-        "system: a\nnodes:\n  n:\n    class: declaring:Declaring\n    publishers:\n"
-        f"      text: {{{port}}}\n"
-        "  other:\n    subscriptions:\n"
-        f"      text: {{{port}, log: message}}\n"
+        "system: a\nnodes:\n"
+        f"  n: {{class: declaring:Declaring, publishers: {{text: {{{port}}}}}}}\n"
+        f"  other: {{subscriptions: {{text: {{{port}, log: message}}}}}}\n"
     )
-    code = DECLARING.replace('"~/text"', '"/text"')
-    (tmp_path / "declaring.py").write_text(code, encoding="utf-8")
-    found = [item for item in diagnostics_in(system, tmp_path) if item.rule.code == "RC487"]
-    assert [item.rule.severity for item in found] == [severity]
+    files = {"a.yaml": system, "declaring.py": DECLARING.replace('"~/text"', '"/text"')}
+    diagnostics = load_project(tmp_path, files).diagnostics
+    assert [item.severity for item in diagnostics if item.rule.code == "RC487"] == [severity]
 
 
 HOSTED = """\
@@ -147,30 +139,24 @@ class Robot(Node):
     def __init__(self, *, spins=False, cli_args=None):
         {init}
 """
+ERROR, WARNING = [Severity.ERROR], [Severity.WARNING]
+#: Constructors, and the severities of the reports about them.
 REFUSED = [
-    ('super().__init__("r", cli_args=["-r"])', [Severity.ERROR]),
+    ('super().__init__("r", cli_args=["-r"])', ERROR),
     ('super().__init__("r", cli_args=cli_args)', []),
     ('super().__init__("r", cli_args=None)', []),
-    ('super().__init__("r")\n        rclpy.spin(self)', [Severity.ERROR]),
-    (
-        'super().__init__("r")\n        if spins:\n            rclpy.spin(self)',
-        [Severity.WARNING],
-    ),
-    ('super().__init__("r")\n        self.x = rclpy.create_node("x")', [Severity.ERROR]),
-    (
-        'super().__init__("r")\n        self.x = spins and rclpy.create_node("x")',
-        [Severity.WARNING],
-    ),
+    ('super().__init__("r")\n        rclpy.spin(self)', ERROR),
+    ('super().__init__("r")\n        if spins:\n            rclpy.spin(self)', WARNING),
+    ('super().__init__("r")\n        self.x = rclpy.create_node("x")', ERROR),
+    ('super().__init__("r")\n        self.x = spins and rclpy.create_node("x")', WARNING),
 ]
 
 
 def test_only_what_hosting_surely_refuses_is_an_error(tmp_path: Path) -> None:
     codes = [HOSTED.format(init=init) for init, _ in REFUSED]
     results = diagnostics_of(CLASS.system, codes, tmp_path)
-    severities = [[item.rule.severity for item in found] for found in results]
-    assert list(zip(codes, severities, strict=True)) == [
-        (HOSTED.format(init=init), expected) for init, expected in REFUSED
-    ]
+    for case, found in zip(REFUSED, results, strict=True):
+        assert [item.rule.severity for item in found] == case[1], case
     assert {item.rule.name for found in results for item in found} == {"unsupported-class"}
 
 

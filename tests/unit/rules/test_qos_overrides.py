@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from composer.loading import load_bytes
-from composer.model import System
 from tests.unit.support.checking import diagnostics_in, diagnostics_of_each, quoted
 
 NODES = """\
@@ -29,11 +28,7 @@ def words(talker: str = "", listener: str = "", above: str = "") -> str:
 
 
 def profile(text: str, node: str, folder: Path) -> dict[str, object]:
-    loaded = load_bytes(text.encode(), folder, shown="system.yaml")
-    assert isinstance(loaded.system, System)
-    found = loaded.system.node(node)
-    assert found is not None
-    changed = found.ports[0].qos
+    changed = load_bytes(text.encode(), folder, shown="system.yaml").system.node(node).ports[0].qos
     return {name: getattr(changed.profile, name) for name in changed.overridden}
 
 
@@ -65,104 +60,63 @@ def test_policies(given: str, expected: dict[str, object], tmp_path: Path) -> No
         assert profile(text, "listener", tmp_path) == {}
 
 
-@pytest.mark.parametrize(
-    ("talker", "listener", "place", "message", "hint"),
-    [
-        (
-            "qos_overrides./wrods.publisher.depth: 1",
-            "",
-            "qos_overrides./wrods.publisher.depth",
-            "node 'talker' has no topic '/wrods'",
-            "did you mean '/words'?",
-        ),
-        (
-            "qos_overrides.words.publisher.depth: 1",
-            "",
-            "qos_overrides.words.publisher.depth",
-            "node 'talker' has no topic 'words'",
-            "did you mean '/words'?",
-        ),
-        (
-            f"{SUBSCRIPTION}.depth: 1",
-            "",
-            f"{SUBSCRIPTION}.depth",
-            "node 'talker' has no subscription on '/words'",
-            "valid here: publisher",
-        ),
-        (
-            f"{PUBLISHER}.realiability: best_effort",
-            "",
-            f"{PUBLISHER}.realiability",
-            "the policy 'realiability' of a publisher cannot be overridden",
-            "did you mean 'reliability'?",
-        ),
-        (
-            f"{PUBLISHER}.avoid_ros_namespace_conventions: true",
-            "",
-            f"{PUBLISHER}.avoid_ros_namespace_conventions",
-            "the policy 'avoid_ros_namespace_conventions' of a publisher cannot be overridden",
-            "valid here: deadline, depth, durability, history, lifespan, liveliness, "
-            "liveliness_lease_duration, reliability",
-        ),
-        (
-            "",
-            f"{SUBSCRIPTION}.lifespan: 1000000",
-            f"{SUBSCRIPTION}.lifespan",
-            "the policy 'lifespan' of a subscription cannot be overridden",
-            "valid here: deadline, depth, durability, history, liveliness, "
-            "liveliness_lease_duration, reliability",
-        ),
-        (
-            f"{PUBLISHER}.history: keep_lost",
-            "",
-            "keep_lost",
-            f"parameter '{PUBLISHER}.history' cannot be the string 'keep_lost'",
-            "did you mean 'keep_last'?",
-        ),
-        (
-            f"{PUBLISHER}.depth: '3'",
-            "",
-            "'3'",
-            f"parameter '{PUBLISHER}.depth' must be of type integer, not the string '3'",
-            None,
-        ),
-        (
-            f"{PUBLISHER}.deadline: -1",
-            "",
-            "-1",
-            f"parameter '{PUBLISHER}.deadline': -1 is less than the minimum of 0",
-            None,
-        ),
-        (
-            f"{PUBLISHER}.reliability: best_effort",
-            "",
-            "best_effort",
-            "publisher 'talker.words' offers reliability best_effort on '/words', "
-            "but subscription 'listener.words' requests reliable",
-            "offer reliable, or request best_effort",
-        ),
-        (
-            "",
-            f"{SUBSCRIPTION}.durability: transient_local",
-            "transient_local",
-            "subscription 'listener.words' requests durability transient_local on '/words', "
-            "but publisher 'talker.words' offers volatile",
-            "offer transient_local, or request volatile",
-        ),
-    ],
-)
-def test_mistakes(
-    talker: str, listener: str, place: str, message: str, hint: str | None, tmp_path: Path
-) -> None:
-    (found,) = diagnostics_in(words(talker, listener), tmp_path)
-    assert (quoted(found), found.message, found.hint) == (place, message, hint)
+def cannot_be_overridden(policy: str, end: str) -> str:
+    return f"the policy '{policy}' of a {end} cannot be overridden"
+
+
+POLICIES = "valid here: deadline, depth, durability, history, "
+LAST_POLICIES = "liveliness, liveliness_lease_duration, reliability"
+#: Parameters of the talker or, with a subscription, of the listener; the message and the hint; the
+#: value is marked if the name is right.
+MISTAKES = [
+    ("qos_overrides./wrods.publisher.depth: 1",
+     "node 'talker' has no topic '/wrods'", "did you mean '/words'?"),
+    ("qos_overrides.words.publisher.depth: 1",
+     "node 'talker' has no topic 'words'", "did you mean '/words'?"),
+    (f"{PUBLISHER}.realiability: best_effort",
+     cannot_be_overridden("realiability", "publisher"), "did you mean 'reliability'?"),
+    (f"{PUBLISHER}.avoid_ros_namespace_conventions: true",
+     cannot_be_overridden("avoid_ros_namespace_conventions", "publisher"),
+     f"{POLICIES}lifespan, {LAST_POLICIES}"),
+    (f"{SUBSCRIPTION}.lifespan: 1000000",
+     cannot_be_overridden("lifespan", "subscription"), POLICIES + LAST_POLICIES),
+    (f"{PUBLISHER}.history: !keep_lost",
+     f"parameter '{PUBLISHER}.history' cannot be the string 'keep_lost'",
+     "did you mean 'keep_last'?"),
+    (f"{PUBLISHER}.depth: !'3'",
+     f"parameter '{PUBLISHER}.depth' must be of type integer, not the string '3'", None),
+    (f"{PUBLISHER}.deadline: !-1",
+     f"parameter '{PUBLISHER}.deadline': -1 is less than the minimum of 0", None),
+    (f"{PUBLISHER}.reliability: !best_effort",
+     "publisher 'talker.words' offers reliability best_effort on '/words', "
+     "but subscription 'listener.words' requests reliable",
+     "offer reliable, or request best_effort"),
+    (f"{SUBSCRIPTION}.durability: !transient_local",
+     "subscription 'listener.words' requests durability transient_local on '/words', "
+     "but publisher 'talker.words' offers volatile",
+     "offer transient_local, or request volatile"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "message", "hint"), MISTAKES)
+def test_mistakes(given: str, message: str, hint: str | None, tmp_path: Path) -> None:
+    name, value = given.split(": ")
+    node = "listener" if name.startswith(SUBSCRIPTION) else "talker"
+    (found,) = diagnostics_in(words(**{node: given.replace("!", "")}), tmp_path)
+    marked = value[1:] if value.startswith("!") else name
+    assert (quoted(found), found.message, found.hint) == (marked, message, hint)
+
+
+def test_a_node_has_no_such_end(tmp_path: Path) -> None:
+    (found,) = diagnostics_in(words(f"{SUBSCRIPTION}.depth: 1"), tmp_path)
+    assert quoted(found) == f"{SUBSCRIPTION}.depth"
+    assert found.message == "node 'talker' has no subscription on '/words'"
+    assert found.hint == "valid here: publisher"
 
 
 def test_an_override_takes_precedence_over_a_connection(tmp_path: Path) -> None:
-    connections = (
-        "connections: [{topic: /words, from: talker.words, to: listener.words, qos: command}]\n"
-    )
-    text = words(f"{PUBLISHER}.depth: 4", above=connections)
+    connection = "{topic: /words, from: talker.words, to: listener.words, qos: command}"
+    text = words(f"{PUBLISHER}.depth: 4", above=f"connections: [{connection}]\n")
     assert profile(text, "talker", tmp_path) == {"depth": 4}
     assert diagnostics_in(text, tmp_path) == []
 
@@ -194,23 +148,16 @@ DURABILITY = ", qos_overriding_options=QoSOverridingOptions([QoSPolicyKind.DURAB
 COMPUTED = ", qos_overriding_options=QoSOverridingOptions(KINDS)"
 
 
+CREATES = "class 'Talker' creates publisher 'words' with"
 #: Options of the publisher of a class, an override, and the diagnostic.
 OVERRIDDEN = [
-    ("", "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
+    ("", "depth: 3", f"{CREATES} depth 10, not 3"),
     (OPTS_IN, "depth: 3", None),
     (DURABILITY, "durability: transient_local", None),
-    (DURABILITY, "depth: 3", "class 'Talker' creates publisher 'words' with depth 10, not 3"),
+    (DURABILITY, "depth: 3", f"{CREATES} depth 10, not 3"),
     (COMPUTED, "depth: 3", None),
-    (
-        OPTS_IN,
-        "deadline: 1000000",
-        "class 'Talker' creates publisher 'words' with deadline_ms unlimited, not 1.0",
-    ),
-    (
-        "",
-        "reliability: best_effort",
-        "class 'Talker' creates publisher 'words' with reliability reliable, not best_effort",
-    ),
+    (OPTS_IN, "deadline: 1000000", f"{CREATES} deadline_ms unlimited, not 1.0"),
+    ("", "reliability: best_effort", f"{CREATES} reliability reliable, not best_effort"),
     (
         OPTS_IN,
         "reliability: best_effort",
@@ -221,20 +168,12 @@ OVERRIDDEN = [
 
 
 def test_a_class_decides_whether_parameters_override_its_qos(tmp_path: Path) -> None:
-    system = f"""\
-system: words
-nodes:
-  talker:
-    class: "talker:Talker"
-    parameters: {{{PUBLISHER}.%s, qos_overrides./other.publisher_id.depth: 2}}
-    publishers: {{words: {{type: std_msgs/msg/String, qos: command}}}}
-  listener:
-    subscriptions: {{words: {{type: std_msgs/msg/String, qos: command, log: "{{message.data}}"}}}}
-"""
+    system = words(f"{PUBLISHER}.%s, qos_overrides./other.publisher_id.depth: 2")
+    system = system.replace("  talker:\n", '  talker:\n    class: "talker:Talker"\n')
+    system = system.replace("    timers: {tick: {rate_hz: 1, publish: {words: {}}}}\n", "")
     projects = [
-        {"system.yaml": system % given, "talker.py": CLASS.format(options=options)}
+        {"system.yaml": system.replace("%s", given), "talker.py": CLASS.format(options=options)}
         for options, given, _ in OVERRIDDEN
     ]
     for case, found in zip(OVERRIDDEN, diagnostics_of_each(projects, tmp_path), strict=True):
-        messages = [item.message for item in found]
-        assert messages == ([] if case[2] is None else [case[2]]), case
+        assert [item.message for item in found] == [case[2]][: case[2] is not None], case

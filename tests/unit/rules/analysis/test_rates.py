@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import load
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.rates import rates
+from tests.unit.support.checking import load_project
 
 HEAD = "system: demo\nnodes:\n"
 TALKER = """\
@@ -38,37 +38,45 @@ HANDLERS = {
 }
 
 
-def topic_hz(name: str, text: str, folder: Path) -> float | None:
-    path = folder / "system.yaml"
-    path.write_text(HEAD + text, encoding="utf-8")
-    loading = load(path)
-    assert loading.system is not None
+def topic_hz(name: str, text: str, folder: Path, python: str = "") -> float | None:
+    loading = load_project(folder, {"system.yaml": HEAD + text, "robot.py": python})
     context = Context(loading.system, loading.interfaces, loading.node_types)
     return rates(context).topic_hz(name)
 
 
-def test_a_timer_determines_the_rate_of_its_publishers(tmp_path: Path) -> None:
-    assert topic_hz("/chatter", TALKER, tmp_path) == pytest.approx(20.0)
+BACK = RELAY.replace("relay:", "back:").replace("chatter", "x").replace("echo", "chatter")
 
 
-def test_a_relay_publishes_at_the_rate_of_its_subscription(tmp_path: Path) -> None:
-    assert topic_hz("/echo", TALKER + RELAY, tmp_path) == pytest.approx(20.0)
-
-
-def test_publishers_of_one_topic_add_up(tmp_path: Path) -> None:
-    other = TALKER.replace("talker", "second").replace("20.0", "5.0")
-    assert topic_hz("/echo", TALKER + RELAY + other, tmp_path) == pytest.approx(25.0)
-
-
-def test_a_topic_with_external_publishers_has_no_known_rate(tmp_path: Path) -> None:
-    outside = RELAY.replace("qos: command, publish", "qos: command, external: true, publish")
-    assert topic_hz("/echo", TALKER + outside, tmp_path) is None
-
-
-def test_topics_in_a_cycle_have_no_known_rate(tmp_path: Path) -> None:
-    back = RELAY.replace("relay:", "back:").replace("chatter", "x").replace("echo", "chatter")
-    back = back.replace("      x:", "      echo:")
-    assert topic_hz("/echo", TALKER + RELAY + back, tmp_path) is None
+@pytest.mark.parametrize(
+    ("topic", "nodes", "rate_hz"),
+    [
+        pytest.param("/chatter", [TALKER], 20.0, id="a timer"),
+        pytest.param("/echo", [TALKER, RELAY], 20.0, id="a relay"),
+        pytest.param(
+            "/echo",
+            [TALKER, RELAY, TALKER.replace("talker", "second").replace("20.0", "5.0")],
+            25.0,
+            id="publishers of one topic add up",
+        ),
+        pytest.param(
+            "/echo",
+            [
+                TALKER,
+                RELAY.replace("qos: command, publish", "qos: command, external: true, publish"),
+            ],
+            None,
+            id="publishers elsewhere",
+        ),
+        pytest.param(
+            "/echo", [TALKER, RELAY, BACK.replace("      x:", "      echo:")], None, id="a cycle"
+        ),
+    ],
+)
+def test_rates_of_topics(
+    topic: str, nodes: list[str], rate_hz: float | None, tmp_path: Path
+) -> None:
+    found = topic_hz(topic, "".join(nodes), tmp_path)
+    assert found == (rate_hz and pytest.approx(rate_hz))
 
 
 def behavior(**bodies: str) -> str:
@@ -101,8 +109,7 @@ PUBLISH = "self.publishers.chatter.publish(None)"
 def test_publishers_in_behaviors_are_recognized(
     bodies: dict[str, str], rate_hz: float | None, tmp_path: Path
 ) -> None:
-    (tmp_path / "robot.py").write_text(behavior(**bodies), encoding="utf-8")
-    assert topic_hz("/chatter", BEHAVIOR, tmp_path) == rate_hz
+    assert topic_hz("/chatter", BEHAVIOR, tmp_path, behavior(**bodies)) == rate_hz
 
 
 @pytest.mark.slow  # 1500 nodes
