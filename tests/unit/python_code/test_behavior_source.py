@@ -9,6 +9,7 @@ import pytest
 from composer.base.source import Located, SourceFile, Span
 from composer.model import BehaviorReference
 from composer.python_code.lookup import BehaviorSource, find_behavior
+from tests.unit.support.checking import write_files
 
 
 def find(text: str, folder: Path) -> BehaviorSource:
@@ -16,131 +17,101 @@ def find(text: str, folder: Path) -> BehaviorSource:
     return find_behavior(BehaviorReference(Located(text, span), folder))
 
 
-def read(folder: Path, text: str) -> BehaviorSource:
-    (folder / "robot.py").write_text(text, encoding="utf-8")
+def read(folder: Path, text: str, **modules: str) -> BehaviorSource:
+    """Find the class ``Robot`` in a text, next to other modules."""
+    write_files(folder, {"robot.py": text} | {f"{name}.py": it for name, it in modules.items()})
     return find("robot:Robot", folder)
 
 
 def test_methods_have_names_spans_and_arguments(tmp_path: Path) -> None:
-    source = read(
-        tmp_path,
-        "class Robot:\n"
-        "    def on_scan(self, message): ...\n"
-        "    async  def on_drive(self, goal, *, speed): ...\n"
-        "    def on_ask(self, request, response=None, *more): ...\n",
-    )
-    assert source.module_found
-    assert source.class_found
-    assert source.complete
+    text = """\
+class Robot:
+    def on_scan(self, message): ...
+    async  def on_drive(self, goal, *, speed): ...
+    def on_ask(self, request, response=None, *more): ...
+    ä = "ö"; on_tick = print
+    @staticmethod
+    def on_static(message): ...
+    @classmethod
+    def on_class(cls): ...
+    @timed(3)
+    def on_hidden(self): ...
+"""
+    source = read(tmp_path, text)
+    assert (source.module_found, source.class_found, source.complete) == (True, True, True)
     assert source.class_names == ("Robot",)
-    scan, drive, ask = source.methods
-    assert (scan.name, scan.arguments, scan.is_async) == ("on_scan", ("message",), False)
+    methods = {method.name: method for method in source.methods}
+    scan, drive, ask = (methods[name] for name in ("on_scan", "on_drive", "on_ask"))
+    assert (scan.arguments, scan.is_async) == (("message",), False)
     assert (scan.span.line, scan.span.column, scan.span.length) == (2, 9, 7)
     assert (drive.is_async, drive.span.column) == (True, 16)
     assert [scan.accepts(count) for count in (0, 1, 2)] == [False, True, False]
     assert not drive.accepts(1)
     assert [ask.accepts(count) for count in (0, 1, 2, 5)] == [False, True, True, True]
-
-
-def test_columns_count_characters(tmp_path: Path) -> None:
-    source = read(tmp_path, 'class Robot:\n    ä = "ö"; on_tick = print\n')
-    method = source.method("on_tick")
-    assert method is not None
-    assert (method.span.line, method.span.column) == (2, 14)
-
-
-def test_static_and_class_methods_have_their_arguments(tmp_path: Path) -> None:
-    source = read(
-        tmp_path,
-        "class Robot:\n"
-        "    @staticmethod\n"
-        "    def on_scan(message): ...\n"
-        "    @classmethod\n"
-        "    def on_tick(cls): ...\n",
-    )
-    assert [method.arguments for method in source.methods] == [("message",), ()]
-
-
-def test_hidden_signatures_are_unknown(tmp_path: Path) -> None:
-    source = read(
-        tmp_path,
-        "class Robot:\n    @timed(3)\n    def on_scan(self): ...\n    on_tick = make_handler()\n",
-    )
-    assert [method.known for method in source.methods] == [False, False]
-    assert all(method.accepts(7) for method in source.methods)
+    # Columns count characters.
+    assert (methods["on_tick"].span.line, methods["on_tick"].span.column) == (5, 14)
+    assert methods["on_static"].arguments == ("message",)
+    assert methods["on_class"].arguments == ()
+    # Signatures that are hidden are unknown.
+    for name in ("on_hidden", "on_tick"):
+        assert not methods[name].known
+        assert methods[name].accepts(7)
 
 
 def test_bases_are_followed_within_the_folder(tmp_path: Path) -> None:
-    (tmp_path / "base.py").write_text("class Base:\n    def on_base(self): ...\n")
-    (tmp_path / "wheels.py").write_text("class Wheels:\n    def on_wheels(self): ...\n")
-    source = read(
-        tmp_path,
-        "import wheels as w\n"
-        "from base import Base as Root\n"
-        "from composer.behavior import Behavior\n"
-        "class Middle(Root, Behavior):\n    def on_middle(self): ...\n"
-        "class Robot(Middle, w.Wheels):\n    def on_robot(self): ...\n",
-    )
+    text = """\
+import wheels as w
+from base import Base as Root
+from composer.behavior import Behavior
+class Middle(Root, Behavior):
+    def on_middle(self): ...
+class Robot(Middle, w.Wheels):
+    async def on_middle(self): ...
+    def on_robot(self): ...
+"""
+    base = "class Base:\n    def on_base(self): ...\n"
+    wheels = "class Wheels:\n    def on_wheels(self): ...\n"
+    source = read(tmp_path, text, base=base, wheels=wheels)
     assert source.complete
     names = [method.name for method in source.methods]
-    assert names == ["on_robot", "on_middle", "on_base", "on_wheels"]
-
-
-def test_the_nearest_definition_of_a_method_counts(tmp_path: Path) -> None:
-    source = read(
-        tmp_path,
-        "class Base:\n    def on_tick(self): ...\n"
-        "class Robot(Base):\n    async def on_tick(self): ...\n",
-    )
-    assert [method.is_async for method in source.methods] == [True]
+    assert names == ["on_middle", "on_robot", "on_base", "on_wheels"]
+    assert source.method("on_middle").is_async  # the nearest definition
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("text", "complete"),
     [
-        "from nowhere import Base\nclass Robot(Base): ...\n",
-        "class Robot(make()): ...\n",
-        "@dataclass\nclass Robot: ...\n",
-        "class Robot(metaclass=Meta): ...\n",
-        "class Robot:\n    def __getattr__(self, name): ...\n",
+        # A base of the typed module has no handlers.
+        ("from composer.typed import RobotBehavior\nclass Robot(RobotBehavior): ...\n", True),
+        ("from nowhere import Base\nclass Robot(Base): ...\n", False),
+        ("class Robot(make()): ...\n", False),
+        ("@dataclass\nclass Robot: ...\n", False),
+        ("class Robot(metaclass=Meta): ...\n", False),
+        ("class Robot:\n    def __getattr__(self, name): ...\n", False),
+        # A class that may exist is not missing.
+        ("Robot = make()\n", False),
+        ("from nowhere import Robot\n", False),
+        ("from nowhere import *\n", False),
+        ("def __getattr__(name): ...\n", False),
     ],
 )
-def test_dynamic_classes_are_incomplete(tmp_path: Path, text: str) -> None:
+def test_dynamic_classes_are_incomplete(tmp_path: Path, text: str, complete: bool) -> None:
     source = read(tmp_path, text)
-    assert source.class_found
-    assert not source.complete
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Robot = make()\n",
-        "from nowhere import Robot\n",
-        "from nowhere import *\n",
-        "def __getattr__(name): ...\n",
-    ],
-)
-def test_a_class_that_may_exist_is_not_missing(tmp_path: Path, text: str) -> None:
-    source = read(tmp_path, text)
-    assert source.class_found
-    assert not source.complete
-
-
-def test_a_base_of_the_typed_module_has_no_handlers(tmp_path: Path) -> None:
-    source = read(
-        tmp_path, "from composer.typed import RobotBehavior\nclass Robot(RobotBehavior): ...\n"
-    )
-    assert source.complete
+    assert (source.class_found, source.complete) == (True, complete)
 
 
 def test_alternative_imports_have_no_single_origin(tmp_path: Path) -> None:
-    (tmp_path / "old.py").write_text("class Base:\n    def on_old(self): ...\n")
-    (tmp_path / "new.py").write_text("class Base:\n    def on_new(self): ...\n")
-    source = read(
-        tmp_path,
-        "import time\nif time.time() > 0:\n    from old import Base\n"
-        "else:\n    from new import Base\nimport time\nclass Robot(Base): ...\n",
-    )
+    text = """\
+import time
+if time.time() > 0:
+    from old import Base
+else:
+    from new import Base
+import time
+class Robot(Base): ...
+"""
+    base = "class Base:\n    def on_base(self): ...\n"
+    source = read(tmp_path, text, old=base, new=base)
     assert not source.complete
     module = source.classes[0][0]
     assert sorted(module.alternatives) == ["Base"]
@@ -149,9 +120,8 @@ def test_alternative_imports_have_no_single_origin(tmp_path: Path) -> None:
 
 
 def test_broken_modules_have_their_place_and_text(tmp_path: Path) -> None:
-    (tmp_path / "helper.py").write_text("def help(:\n")
     for text in ("import helper\nclass Robot: ...\n", "from helper import Robot\n"):
-        (broken,) = read(tmp_path, text).broken
+        (broken,) = read(tmp_path, text, helper="def help(:\n").broken
         assert broken.path == tmp_path / "helper.py"
         assert broken.span.file.text == "def help(:\n"
         assert broken.message.startswith("module 'helper' is not Python: ")
@@ -161,64 +131,48 @@ def test_broken_modules_have_their_place_and_text(tmp_path: Path) -> None:
 
 
 def test_relative_imports_are_followed(tmp_path: Path) -> None:
-    package = tmp_path / "robots"
-    package.mkdir()
-    (package / "__init__.py").write_text("from .arm import Arm\nfrom . import leg\n")
-    (package / "arm.py").write_text(
-        "from . import leg\nclass Arm(leg.Leg):\n    def on_arm(self): ...\n"
-    )
-    (package / "leg.py").write_text("class Leg:\n    def on_leg(self): ...\n")
+    files = {
+        "robots/__init__.py": "from .arm import Arm\nfrom . import leg\n",
+        "robots/arm.py": "from . import leg\nclass Arm(leg.Leg):\n    def on_arm(self): ...\n",
+        "robots/leg.py": "class Leg:\n    def on_leg(self): ...\n",
+    }
+    write_files(tmp_path, files)
     source = find("robots:Arm", tmp_path)
     assert source.complete
     assert [method.name for method in source.methods] == ["on_arm", "on_leg"]
     assert find("robots.arm:Arm", tmp_path).complete
 
 
-def test_conditional_classes_are_found(tmp_path: Path) -> None:
+def test_conditional_classes_are_found_and_cyclic_bases_end(tmp_path: Path) -> None:
     text = (
         "try:\n    import fast\nexcept ImportError:\n"
         "    if True:\n        class Robot:\n            def on_tick(self): ...\n"
     )
     assert [method.name for method in read(tmp_path, text).methods] == ["on_tick"]
-
-
-def test_cyclic_bases_end(tmp_path: Path) -> None:
-    (tmp_path / "other.py").write_text("from robot import Robot\nclass Other(Robot): ...\n")
-    source = read(tmp_path, "from other import Other\nclass Robot(Other): ...\n")
-    assert source.class_found
+    other = "from robot import Robot\nclass Other(Robot): ...\n"
+    text = "from other import Other\nclass Robot(Other): ...\n"
+    assert read(tmp_path, text, other=other).class_found
 
 
 def test_the_nodes_folder_of_the_project_is_searched_last(tmp_path: Path) -> None:
-    nodes = tmp_path / "nodes"
-    systems = tmp_path / "systems"
-    nodes.mkdir()
+    nodes, systems = tmp_path / "nodes", tmp_path / "systems"
     systems.mkdir()
-    (nodes / "robot.py").write_text("class Robot: ...\n")
-    assert find("robot:Robot", systems).path == nodes / "robot.py"
-    (systems / "robot.py").write_text("class Robot: ...\n")
-    assert find("robot:Robot", systems).path == systems / "robot.py"
+    for folder in (nodes, systems):
+        write_files(folder, {"robot.py": "class Robot: ...\n"})
+        assert find("robot:Robot", systems).path == folder / "robot.py"
 
 
 def test_installed_modules_are_found_without_importing_them(tmp_path: Path) -> None:
-    sys.modules.pop("mailbox", None)
+    for name in [name for name in sys.modules if name.split(".")[0] in ("mailbox", "wsgiref")]:
+        del sys.modules[name]
     source = find("mailbox:Maildir", tmp_path)
     assert source.class_found
     assert source.method("add") is not None
-    assert "mailbox" not in sys.modules
-
-
-def test_an_installed_package_is_not_imported_for_its_modules(tmp_path: Path) -> None:
-    for name in [name for name in sys.modules if name.split(".")[0] == "wsgiref"]:
-        del sys.modules[name]
     assert find("wsgiref.handlers:CGIHandler", tmp_path).class_found
-    assert not any(name.startswith("wsgiref") for name in sys.modules)
-
-
-def test_a_compiled_module_is_not_missing(tmp_path: Path) -> None:
+    assert not any(name.startswith(("mailbox", "wsgiref")) for name in sys.modules)
+    # A compiled module is not missing.
     source = find("sys:Robot", tmp_path)
-    assert source.module_found
-    assert source.class_found
-    assert not source.complete
+    assert (source.module_found, source.class_found, source.complete) == (True, True, False)
 
 
 @pytest.mark.parametrize(
@@ -233,14 +187,10 @@ def test_a_missing_class_is_reported_with_the_existing_ones(tmp_path: Path) -> N
     (tmp_path / "robot.py").write_text("class Rover: ...\nclass Arm: ...\n")
     for text in ("robot:Robot", "robot"):
         source = find(text, tmp_path)
-        assert source.module_found
-        assert not source.class_found
+        assert (source.module_found, source.class_found) == (True, False)
         assert source.class_names == ("Rover", "Arm")
-
-
-def test_changes_of_the_file_are_noticed(tmp_path: Path) -> None:
-    assert read(tmp_path, "class Rover: ...\n").class_found is False
-    assert read(tmp_path, "class Robot: ...\n").class_found is True
+    # Changes of the file are noticed.
+    assert read(tmp_path, "class Robot: ...\n").class_found
 
 
 @pytest.mark.parametrize(

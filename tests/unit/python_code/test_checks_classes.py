@@ -83,22 +83,8 @@ PARAMETERS = [
     self.get_parameter('rates').value  # PARAMETER
     """,
     """
-    for name in self.names:
-        self.declare_parameter(name, 1.0)
-    self.get_parameter('rate').value
-    """,
-    """
-    declare = self.declare_parameter
-    declare('rate', 1.0)
-    self.get_parameter('rate').value
-    """,
-    """
     helper.declare(self)
     self.get_parameter('rate').value
-    """,
-    """
-    if self.has_parameter('rate'):
-        self.get_parameter('rate').value
     """,
     """
     self.node.get_parameter('rate')

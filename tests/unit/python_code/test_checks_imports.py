@@ -25,7 +25,7 @@ FILES = {
     ),
 }
 BEHAVIOR = "class Robot:\n    def on_tick(self): ...\n"
-NOT_INSTALLED = "install it, or correct the name"
+
 #: Statements, the text that is underlined and the hint.
 FAIL = [
     ("import nmpy", "nmpy", "did you mean 'numpy'?"),
@@ -50,16 +50,19 @@ FAIL = [
     ("from composer.behavor import Goal", "behavor", "did you mean 'behavior'?"),
 ]  # fmt: skip
 ELSEWHERE = [
-    ("import fastkalman", "fastkalman", NOT_INSTALLED),
-    ("from mars_msgs.msg import Crater", "mars_msgs", NOT_INSTALLED),
-    ("import bson", "bson", NOT_INSTALLED),
-    ("import ntplib", "ntplib", NOT_INSTALLED),
-    ("import cma", "cma", NOT_INSTALLED),
-    ("import arms.gripper", "gripper", NOT_INSTALLED),
-    ("from . import generated", "generated", NOT_INSTALLED),
-    ("from arms import made", "made", NOT_INSTALLED),
-    ("from .written import parameters", "written", NOT_INSTALLED),
-    ("import maths", "maths", NOT_INSTALLED),
+    (code, marked, "install it, or correct the name")
+    for code, marked in {
+        "import fastkalman": "fastkalman",
+        "from mars_msgs.msg import Crater": "mars_msgs",
+        "import bson": "bson",
+        "import ntplib": "ntplib",
+        "import cma": "cma",
+        "import arms.gripper": "gripper",
+        "from . import generated": "generated",
+        "from arms import made": "made",
+        "from .written import parameters": "written",
+        "import maths": "maths",
+    }.items()
 ]
 SUCCEED = """\
 from std_srvs.srv import Trigger
@@ -129,26 +132,13 @@ def test_imports_that_fail(
     assert (item.rule.name, item.primary.text, item.hint) == (rule, text, hint), code
 
 
-@pytest.mark.parametrize(
-    ("place", "rule", "text"),
-    [
-        (("searching", 3), "not-installed", "meter"),
-        (("loading", 3), "not-installed", "motoor"),
-    ],
-)
-def test_modules_that_are_found_at_run_time(
-    place: tuple[str, int],
-    rule: str,
-    text: str,
+def test_modules_that_are_found_at_run_time_and_imports_that_succeed_or_need_not(
     reported: Mapping[tuple[str, int], Diagnostic],
 ) -> None:
-    assert (reported[place].rule.name, reported[place].primary.text) == (rule, text)
-    assert "did you mean" not in str(reported[place].hint)
-
-
-def test_imports_that_succeed_or_need_not(
-    reported: Mapping[tuple[str, int], Diagnostic],
-) -> None:
+    for place, text in ((("searching", 3), "meter"), (("loading", 3), "motoor")):
+        found = reported[place]
+        assert (found.rule.name, found.primary.text) == ("not-installed", text)
+        assert "did you mean" not in str(found.hint)
     rules = {"unknown-import", "not-installed"}
     assert [
         x for (file, _), x in reported.items() if file == "succeeds" and x.rule.name in rules

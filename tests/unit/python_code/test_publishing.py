@@ -35,7 +35,7 @@ SYSTEM = """
 Known = tuple[float | None, list[str] | None]
 
 
-def sender(folder: Path, python: str = SENDER, system: str = SYSTEM) -> Node:
+def sender(folder: Path, python: str, system: str = SYSTEM) -> Node:
     (folder / "sender.py").write_text(dedent(python))
     (node,) = system_of(system, folder).nodes
     return node
@@ -46,82 +46,72 @@ def known_of(body: str, folder: Path) -> Known:
     head = (
         "from composer.behavior import Behavior\nclass Sender(Behavior):\n    def on_tick(self):\n"
     )
-    node = sender(folder, head + indent(dedent(body), "        "))
-    assert node.behavior is not None
+    node = sender(folder, head + indent(body, "        "))
     source = find_behavior(node.behavior)
     causes = causes_in_node(node, source, published_by_method(source)).get("out")
     timers = None if causes is None else [cause.timer.name.value for cause in causes if cause.timer]
     return publishing_rates_hz(node).get("out"), timers
 
 
+EACH_TIME: Known = (20.0, ["tick"])
+SOMETIMES: Known = (None, ["tick"])
+ANYWHERE: Known = (None, None)
+NEVER: Known = (None, [])
+
+
 @pytest.mark.parametrize(
-    "body",
+    ("body", "known"),
     [
-        "self.publishers.out.publish(x)",
-        "x = 1\nif x:\n    x = 2\nself.publishers.out.publish(x)",
-        "for x in y:\n    z()\nself.publishers.out.publish(x)\nreturn",
-        "publish = self.publishers.out.publish\npublish(x)",
-        "out = self.publishers.out\nout.publish(x)",
-        "publishers = self.publishers\nout = publishers.out\nsend = out.publish\nsend(x)",
+        # Unconditional statements.
+        ("self.publishers.out.publish(x)", EACH_TIME),
+        ("x = 1\nif x:\n    x = 2\nself.publishers.out.publish(x)", EACH_TIME),
+        ("for x in y:\n    z()\nself.publishers.out.publish(x)\nreturn", EACH_TIME),
+        ("publish = self.publishers.out.publish\npublish(x)", EACH_TIME),
+        ("out = self.publishers.out\nout.publish(x)", EACH_TIME),
+        (
+            "publishers = self.publishers\nout = publishers.out\nsend = out.publish\nsend(x)",
+            EACH_TIME,
+        ),
+        # Conditional ones, and two.
+        ("if x:\n    self.publishers.out.publish(x)", SOMETIMES),
+        ("if x:\n    return\nself.publishers.out.publish(x)", SOMETIMES),
+        ("for x in y:\n    self.publishers.out.publish(x)", SOMETIMES),
+        ("assert x\nself.publishers.out.publish(x)", SOMETIMES),
+        ("self.publishers.out.publish(x)\nself.publishers.out.publish(x)", SOMETIMES),
+        ("out = self.publishers.out\nif x:\n    out.publish(x)", SOMETIMES),
+        # Publishers that are stored.
+        ("send(self.publishers.out)", ANYWHERE),
+        ("self.send = self.publishers.out.publish", ANYWHERE),
+        ("out = self.publishers.out\nsend(out)", ANYWHERE),
+        ("out = self.publishers.out\nout = other\nout.publish(x)", ANYWHERE),
+        ("def send(out=self.publishers.out):\n    out.publish(x)", ANYWHERE),
+        # Other attributes.
+        ("out.publish(x)", NEVER),
+        ("self.out.publish(x)", NEVER),
+        ("self.publishers", NEVER),
+        ("self.publishers.out.topic", NEVER),
     ],
 )
-def test_unconditional_statements_publish_each_time(body: str, tmp_path: Path) -> None:
-    assert known_of(body, tmp_path) == (20.0, ["tick"])
+def test_statements_that_publish(body: str, known: Known, tmp_path: Path) -> None:
+    assert known_of(body, tmp_path) == known
+
+
+SUBSCRIPTION = (
+    "subscriptions: {in: {type: std_msgs/msg/String, publish: {out: {}}}}\n        timers:"
+)
 
 
 @pytest.mark.parametrize(
-    "body",
+    ("python", "system", "rates_hz"),
     [
-        "if x:\n    self.publishers.out.publish(x)",
-        "if x:\n    return\nself.publishers.out.publish(x)",
-        "for x in y:\n    self.publishers.out.publish(x)",
-        "assert x\nself.publishers.out.publish(x)",
-        "self.publishers.out.publish(x)\nself.publishers.out.publish(x)",
-        "out = self.publishers.out\nif x:\n    out.publish(x)",
+        (SENDER, SYSTEM, {"out": 20.0}),
+        (SENDER.replace("pass", "self.publishers.out.publish(1)"), SYSTEM, {}),
+        (SENDER, SYSTEM.replace("timers:", f"subscriptions: {SUBSCRIPTION}\n        timers:"), {}),
+        (SENDER.replace("on_tick", "on_tock"), SYSTEM, {}),
     ],
+    ids=["a timer", "another handler too", "a subscription too", "without a handler"],
 )
-def test_conditional_statements_publish_at_an_unknown_rate(body: str, tmp_path: Path) -> None:
-    assert known_of(body, tmp_path) == (None, ["tick"])
-
-
-@pytest.mark.parametrize(
-    "body",
-    [
-        "send(self.publishers.out)",
-        "self.send = self.publishers.out.publish",
-        "out = self.publishers.out\nsend(out)",
-        "out = self.publishers.out\nout = other\nout.publish(x)",
-        "def send(out=self.publishers.out):\n    out.publish(x)",
-    ],
-)
-def test_stored_publishers_may_be_used_anywhere(body: str, tmp_path: Path) -> None:
-    assert known_of(body, tmp_path) == (None, None)
-
-
-@pytest.mark.parametrize(
-    "body",
-    ["out.publish(x)", "self.out.publish(x)", "self.publishers", "self.publishers.out.topic"],
-)
-def test_other_attributes_are_not_publishers(body: str, tmp_path: Path) -> None:
-    assert known_of(body, tmp_path) == (None, [])
-
-
-def test_the_rate_is_that_of_the_timer_whose_handler_publishes(tmp_path: Path) -> None:
-    assert publishing_rates_hz(sender(tmp_path)) == {"out": 20.0}
-
-
-def test_the_rate_is_unknown_if_another_handler_publishes_too(tmp_path: Path) -> None:
-    python = SENDER.replace("pass", "self.publishers.out.publish(1)")
-    assert publishing_rates_hz(sender(tmp_path, python)) == {}
-
-
-def test_the_rate_is_unknown_if_a_subscription_publishes_too(tmp_path: Path) -> None:
-    system = SYSTEM.replace(
-        "timers:",
-        "subscriptions: {in: {type: std_msgs/msg/String, publish: {out: {}}}}\n        timers:",
-    )
-    assert publishing_rates_hz(sender(tmp_path, SENDER, system)) == {}
-
-
-def test_the_rate_is_unknown_without_a_handler(tmp_path: Path) -> None:
-    assert publishing_rates_hz(sender(tmp_path, SENDER.replace("on_tick", "on_tock"))) == {}
+def test_the_rate_is_that_of_the_timer_whose_handler_publishes(
+    python: str, system: str, rates_hz: dict[str, float], tmp_path: Path
+) -> None:
+    assert publishing_rates_hz(sender(tmp_path, python, system)) == rates_hz
