@@ -96,9 +96,7 @@ def test_statements_that_publish(body: str, known: Known, tmp_path: Path) -> Non
     assert known_of(body, tmp_path) == known
 
 
-SUBSCRIPTION = (
-    "subscriptions: {in: {type: std_msgs/msg/String, publish: {out: {}}}}\n        timers:"
-)
+SUBSCRIPTION = "{in: {type: std_msgs/msg/String, publish: {out: {}}}}"
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib.metadata import version
 from pathlib import Path
 
@@ -10,23 +11,8 @@ import yaml
 
 from composer.bridges.export.deployment import VARIABLES
 from tests.cli.compose import compose
+from tests.unit.support.checking import write_files
 
-SYSTEM = """\
-system: my_robot
-processes:
-  front_camera:
-    cpus: [0, 1]
-    priority: 50
-    memory_mb: 500
-    environment:
-      {MODE: "1e3", OCTAL: "0o17", TIME: "1:30", ANSWER: "no", YES: y, DATE: "2001-01-01",
-       PRICE: "$5 $HOME $(HOME) $$ %d \\"'\\\\ #x", TEXT: "a: b", LONG: LONG, EMPTY: ""}
-  arm: {}
-nodes:
-  camera: {process: front_camera, on_activate: {log: hello}}
-  joint: {process: arm, on_activate: {log: hello}}
-  viewer: {on_activate: {log: hello}}
-"""
 VALUES = {
     "MODE": "1e3",
     "OCTAL": "0o17",
@@ -39,14 +25,26 @@ VALUES = {
     "LONG": "x" * 300 + " y" * 6000 + " #1: " * 10,
     "EMPTY": "",
 }
+SYSTEM = f"""\
+system: my_robot
+processes:
+  front_camera:
+    cpus: [0, 1]
+    priority: 50
+    memory_mb: 500
+    environment: {json.dumps(VALUES)}
+  arm: {{}}
+nodes:
+  camera: {{process: front_camera, on_activate: {{log: hello}}}}
+  joint: {{process: arm, on_activate: {{log: hello}}}}
+  viewer: {{on_activate: {{log: hello}}}}
+"""
 
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a project with a system, in the current folder."""
-    (tmp_path / "systems").mkdir()
-    text = SYSTEM.replace("LONG: LONG", f'LONG: "{VALUES["LONG"]}"')
-    (tmp_path / "systems" / "robot.yaml").write_text(text)
+    write_files(tmp_path, {"systems/robot.yaml": SYSTEM})
     monkeypatch.chdir(tmp_path)
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
@@ -87,57 +85,69 @@ def export(kind: str, *options: str) -> str:
     return done.out
 
 
+def export_image(project: Path, *options: str) -> str:
+    """Return the text of the Containerfile."""
+    export("docker-compose", "-o", "deploy", *options)
+    return (project / "deploy" / "Containerfile").read_text()
+
+
+def interface_package(name: str, message: str) -> dict[str, str]:
+    folder = f"interfaces/{name}"
+    return {
+        f"{folder}/msg/{message}.msg": "bool ok\n",
+        f"{folder}/package.xml": f"<package><name>{name}</name></package>\n",
+    }
+
+
 def test_the_image_has_what_the_project_needs(project: Path) -> None:
-    export("docker-compose", "-o", "deploy")
-    text = (project / "deploy" / "Containerfile").read_text()
+    text = export_image(project)
     assert 'COPY ["deploy/ros2_composer-' in text
     assert "requirements.txt" not in text
     assert "interface build" not in text
     assert "RUN compose validate systems/robot.yaml\n" in text
-    (project / "requirements.txt").write_text("numpy\n")
-    package = project / "interfaces" / "my_msgs"
-    (package / "msg").mkdir(parents=True)
-    (package / "msg" / "Status.msg").write_text("bool ok\n")
-    (package / "package.xml").write_text("<package><name>my_msgs</name></package>\n")
+    write_files(project, {"requirements.txt": "numpy\n", **interface_package("my_msgs", "Status")})
     publisher = "publishers: {status: {type: my_msgs/msg/Status, qos: command, external: true}}"
     add(project, f"  reporter: {{{publisher}}}\n")
     done = compose("export", "docker-compose", "robot", "-o", "deploy")
     assert done.code == 1
     assert "'deploy/Containerfile' exists already\n  --force replaces it" in done.err
-    export("docker-compose", "-o", "deploy", "--force")
-    text = (project / "deploy" / "Containerfile").read_text()
+    text = export_image(project, "--force")
     assert "COPY requirements.txt .\n" in text
     assert "&& compose interface build my_msgs \\\n" in text
     assert "Not in the image" not in text
+    # Another format has the same image.
+    done = compose("export", "kubernetes", "robot", "-o", "deploy")
+    assert done.code == 0, done.err
+    assert "deploy/Containerfile is up to date" in done.err
+    assert sorted(path.name for path in (project / "deploy").iterdir()) == [
+        "Containerfile",
+        "Containerfile.dockerignore",
+        "compose.yaml",
+        "kubernetes.yaml",
+        f"ros2_composer-{version('ros2-composer')}-py3-none-any.whl",
+    ]
 
 
 def test_the_image_has_the_interfaces_that_ros_on_pypi_lacks(project: Path) -> None:
     port = "publishers: {found: {type: other_msgs/msg/Found, qos: command}}"
     laser = "transforms: {static: {laser: {parent: base, translation_m: {x: 1}}}}"
     add(project, f"  finder: {{{port}, on_activate: {{log: hello}}}}\n  laser: {{{laser}}}\n")
-    (project / "composer.yaml").touch()
-    for package, field in (("other_msgs", "bool ok"), ("base_msgs", "bool ok")):
-        folder = project / "interfaces" / package
-        (folder / "msg").mkdir(parents=True)
-        (folder / "msg" / "Found.msg").write_text(f"{field}\n")
-        (folder / "package.xml").write_text(f"<package><name>{package}</name></package>\n")
-    export("docker-compose", "-o", "deploy")
-    text = (project / "deploy" / "Containerfile").read_text()
+    packages = interface_package("other_msgs", "Found") | interface_package("base_msgs", "Found")
+    write_files(project, {"composer.yaml": "", **packages})
+    text = export_image(project)
     (line,) = (line for line in text.splitlines() if "interface build" in line)
     assert set(line.split()[4:-1]) == {"tf2_msgs", "other_msgs", "base_msgs"}
 
 
 def test_the_image_has_no_secrets(project: Path) -> None:
     add(project, "hosts: {jetson: {identity_file: keys/robot}, arm: {identity_file: ~/.ssh/id}}\n")
-    (project / ".gitignore").write_text("/deploy\n")
-    (project / ".env").write_text("PASSWORD=x\n")
-    export("docker-compose", "-o", "deploy")
-    export("docker-compose", "-o", "deploy", "--force")  # the folder exists now
+    write_files(project, {".gitignore": "/deploy\n", ".env": "PASSWORD=x\n"})
+    export_image(project)
+    export_image(project, "--force")  # the folder exists now
     ignored = (project / "deploy" / "Containerfile.dockerignore").read_text().splitlines()
     folder, wheel, *files = ignored[-4:]
-    assert folder == "/deploy"
+    assert (folder, files) == ("/deploy", ["/.env", "/keys/robot"])
     assert wheel.startswith("!/deploy/ros2_composer-")
-    assert files == ["/.env", "/keys/robot"]
     assert not [line for line in ignored if ".ssh/" in line]
     done = compose("export", "kubernetes", "robot", "--list")
     assert done.out.splitlines() == [
@@ -152,24 +162,10 @@ def test_the_image_has_no_secrets(project: Path) -> None:
 def test_a_home_folder_is_not_copied(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (project / "link").symlink_to(project)
     monkeypatch.setenv("HOME", str(project / "link"))
-    (project / "robot.yaml").write_text(SYSTEM.replace("LONG: LONG", "LONG: x"))
+    write_files(project, {"robot.yaml": SYSTEM})
     done = compose("export", "kubernetes", "robot.yaml", "--list")
     assert done.code == 1
     assert f"the root of the project is '{project}', which is not copied" in done.err
-
-
-def test_two_formats_share_the_image(project: Path) -> None:
-    export("docker-compose", "-o", "deploy")
-    done = compose("export", "kubernetes", "robot", "-o", "deploy")
-    assert done.code == 0, done.err
-    assert "deploy/Containerfile is up to date" in done.err
-    assert sorted(path.name for path in (project / "deploy").iterdir()) == [
-        "Containerfile",
-        "Containerfile.dockerignore",
-        "compose.yaml",
-        "kubernetes.yaml",
-        f"ros2_composer-{version('ros2-composer')}-py3-none-any.whl",
-    ]
 
 
 def test_the_commands_of_the_guide_work(project: Path) -> None:

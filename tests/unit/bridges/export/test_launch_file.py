@@ -1,4 +1,4 @@
-"""Launch files of systems with arguments."""
+"""Launch files that run a system, and their arguments."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.compose import compose
+from tests.unit.support.checking import write_files
 
 SYSTEM = """\
 system: robot
@@ -25,10 +26,9 @@ nodes:
 """
 
 
-@pytest.fixture
-def calls(tmp_path: Path) -> dict[str, list[ast.Call]]:
-    """Return the calls in the launch file, by the name of the function."""
-    path = tmp_path / "robot.yaml"
+def calls_in_launch_file(folder: Path) -> dict[str, list[ast.Call]]:
+    """Return the calls in the launch file of the system, by the name of the function."""
+    path = folder / "robot.yaml"
     path.write_text(SYSTEM, encoding="utf-8")
     done = compose("export", "launch", str(path), "lidar=ouster", "namespace=field")
     assert done.code == 0, done.err
@@ -39,7 +39,8 @@ def calls(tmp_path: Path) -> dict[str, list[ast.Call]]:
     return found
 
 
-def test_arguments_are_launch_arguments(calls: dict[str, list[ast.Call]]) -> None:
+def test_arguments_are_launch_arguments_and_the_system_gets_them(tmp_path: Path) -> None:
+    calls = calls_in_launch_file(tmp_path)
     declared = {
         ast.literal_eval(call.args[0]): {
             str(item.arg): ast.literal_eval(item.value) for item in call.keywords
@@ -54,14 +55,34 @@ def test_arguments_are_launch_arguments(calls: dict[str, list[ast.Call]]) -> Non
     assert declared["lidar"] == {"default_value": "ouster", "choices": ["velodyne", "ouster"]}
     assert declared["names"] == {"default_value": '["a", "b"]'}
     assert declared["map"] == {}  # it needs a value
-
-
-def test_the_system_gets_them(calls: dict[str, list[ast.Call]]) -> None:
     (system,) = calls["ComposeSystem"]
     (passed,) = (item.value for item in system.keywords if item.arg == "arguments")
-    assert ast.unparse(passed) == (
-        "[['simulation=', LaunchConfiguration('simulation')],"
-        " ['lidar=', LaunchConfiguration('lidar')],"
-        " ['names=', LaunchConfiguration('names')],"
-        " ['map=', LaunchConfiguration('map')], 'namespace=field']"
-    )
+    names = ("simulation", "lidar", "names", "map")
+    values = [f"['{name}=', LaunchConfiguration('{name}')]" for name in names]
+    assert ast.unparse(passed) == f"[{', '.join(values)}, 'namespace=field']"
+
+
+def test_a_launch_file_names_the_system_relative_to_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    system = "system: robot\nnodes: {a: {on_activate: {log: hello}}}\n"
+    write_files(tmp_path, {"systems/robot.yaml": system})
+    command = ("export", "launch", "systems/robot.yaml", "-o", "launch/robot.launch.py")
+    done = compose(*command)
+    assert (done.code, done.out) == (0, ""), done.err
+    path = tmp_path / "launch" / "robot.launch.py"
+    text = path.read_text()
+    ast.parse(text)
+    assert "SYSTEM = (Path(__file__).parent / '../systems/robot.yaml').resolve()" in text
+    assert compose(*command).err == "launch/robot.launch.py is up to date\n"
+    path.write_text("my own")
+    done = compose(*command)
+    assert done.code == 1
+    assert "exists already" in done.err
+    assert compose(*command, "--force").code == 0
+    assert path.read_text() == text
+    # On stdout the path is absolute.
+    done = compose("export", "launch", "robot")
+    assert done.code == 0, done.err
+    assert f"SYSTEM = Path({str(tmp_path / 'systems' / 'robot.yaml')!r})\n" in done.out

@@ -69,18 +69,22 @@ def test_a_unit_runs_as_who_exports_it_with_the_files_that_are_set(tmp_path: Pat
     ]
 
 
-def test_units_of_another_computer_run_as_its_user_or_as_who_exports_them(tmp_path: Path) -> None:
-    for host, user, expected in (
-        ("{workspace: ~/robot}", "ada", "User=ada\n"),
-        ("{workspace: ~/robot}", "root", "User=root\n"),  # without it, there is no HOME
-        ("{workspace: ~/robot, user: robot}", "ada", "User=robot\n"),
-        ("{workspace: ~/robot, user: robot}", None, ""),
-    ):
-        system = system_of(tmp_path, PROCESSES.replace("jetson: {}", f"jetson: {host}"))
-        found = units(*system, Installation(PYTHON, {}, remote, user), user=user is None)
-        text = found[PurePosixPath("jetson/robot-c.service")]
-        lines = [f"{line}\n" for line in text.splitlines() if line.startswith("User=")]
-        assert "".join(lines) == expected
+@pytest.mark.parametrize(
+    ("host", "user", "expected"),
+    [
+        ("{workspace: ~/robot}", "ada", ["User=ada"]),
+        ("{workspace: ~/robot}", "root", ["User=root"]),  # without it, there is no HOME
+        ("{workspace: ~/robot, user: robot}", "ada", ["User=robot"]),
+        ("{workspace: ~/robot, user: robot}", None, []),
+    ],
+)
+def test_units_of_another_computer_run_as_its_user_or_as_who_exports_them(
+    host: str, user: str | None, expected: list[str], tmp_path: Path
+) -> None:
+    system = system_of(tmp_path, PROCESSES.replace("jetson: {}", f"jetson: {host}"))
+    found = units(*system, Installation(PYTHON, {}, remote, user), user=user is None)
+    text = found[PurePosixPath("jetson/robot-c.service")]
+    assert [line for line in text.splitlines() if line.startswith("User=")] == expected
 
 
 def test_the_command_names_its_user_also_if_that_is_root(tmp_path: Path) -> None:

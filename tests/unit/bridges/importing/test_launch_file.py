@@ -25,15 +25,10 @@ local_costmap: {local_costmap: {ros__parameters: {radius: 0.22, text: a}}}
 
 def node(name: str | None = "base", **changes: Any) -> dict[str, Any]:
     process = {"left_out": [], "cwd": None, "ends_launch": False} | changes.pop("process", {})
-    found: dict[str, Any] = {
-        "name": name,
-        "namespace": "/",
-        "package": "p",
-        "executable": "program",
-    }
-    found |= {"arguments": [], "ros_arguments": [], "environment": {}, "remappings": {}}
-    found |= {"lifecycle": False, "note": "", "parameters": {}, "sections": {}, "problems": []}
-    return found | changes | {"process": process}
+    found: dict[str, Any] = {"name": name, "namespace": "/", "package": "p"}
+    found |= {"executable": "program", "arguments": [], "ros_arguments": [], "environment": {}}
+    found |= {"remappings": {}, "lifecycle": False, "note": "", "parameters": {}}
+    return found | {"sections": {}, "problems": []} | changes | {"process": process}
 
 
 def report(*nodes: dict[str, Any], left_out: Sequence[str] = ()) -> dict[str, Any]:
@@ -47,28 +42,26 @@ def described(*nodes: dict[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
     return yaml.safe_load(write_system(found))["nodes"], found.left_out
 
 
+LIMITED = "respawn without a limit (of /base): a restart is limited by 'max_attempts'"
+
+
+def restarted(backoff_ms: int, **restart: int) -> dict[str, Any]:
+    restart = {"backoff_ms": backoff_ms, "backoff_max_ms": backoff_ms, **restart}
+    return {"lifecycle": {"on_failure": "restart", "restart": restart}}
+
+
 @pytest.mark.parametrize(
     ("changes", "expected", "left_out"),
     [
         (
             {"process": {"respawn_delay": 2.0, "respawn_max_retries": 3}},
-            {
-                "lifecycle": {
-                    "on_failure": "restart",
-                    "restart": {"backoff_ms": 2000, "backoff_max_ms": 2000, "max_attempts": 3},
-                }
-            },
+            restarted(2000, max_attempts=3),
             (),
         ),
         (
             {"process": {"respawn_delay": 0.0, "respawn_max_retries": -1}},
-            {
-                "lifecycle": {
-                    "on_failure": "restart",
-                    "restart": {"backoff_ms": 0, "backoff_max_ms": 0},
-                }
-            },
-            ("respawn without a limit (of /base): a restart is limited by 'max_attempts'",),
+            restarted(0),
+            (LIMITED,),
         ),
         ({"process": {"ends_launch": True}}, {"lifecycle": {"on_failure": "shutdown"}}, ()),
         ({"process": {"cwd": "/tmp"}}, {"executable": {"working_directory": "/tmp"}}, ()),

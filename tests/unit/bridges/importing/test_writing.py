@@ -12,10 +12,10 @@ from composer.bridges.importing.live import describe_graph
 from composer.bridges.importing.writing import readable, write_node_type, write_system
 from composer.interfaces import Interfaces
 from composer.language.tree import Plain
-from composer.loading import load
 from composer.model import PortKind
 from composer.model.qos import PRESETS, Durability, QosProfile, Reliability
 from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot
+from tests.unit.support.checking import valid_system
 
 STRING = "std_msgs/msg/String"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -39,11 +39,7 @@ TALKER = ObservedNode(
     "/a/talker",
     (
         topic(PortKind.PUBLISHER, "/a/chatter"),
-        topic(
-            PortKind.PUBLISHER,
-            "/a/talker/status",
-            LATCHED,
-        ),
+        topic(PortKind.PUBLISHER, "/a/talker/status", LATCHED),
         topic(PortKind.PUBLISHER, "/tf", QosProfile(deadline_ms=5.0)),
         topic(PortKind.PUBLISHER, "/b/tf", QosProfile()),
         ObservedEndpoint(PortKind.SERVICE, "/a/reset", TRIGGER),
@@ -108,19 +104,11 @@ def test_nodes_are_selected_and_their_counterparts_become_external() -> None:
 
 
 def test_what_is_written_is_read_without_diagnostics(tmp_path: Path) -> None:
-    path = tmp_path / "s.yaml"
-    path.write_text(graph(TALKER, LISTENER), encoding="utf-8")
-    result = load(path)
-    assert [str(item.message) for item in result.diagnostics] == []
-    assert result.system is not None
-    assert [node.full_name for node in result.system.nodes] == ["/a/talker", "/b/talker"]
-    assert [port.full_name for port in result.system.nodes[0].ports] == [
-        "/a/chatter",
-        "/a/talker/status",
-        "/tf",
-        "/b/tf",
-        "/a/reset",
-    ]
+    assert {STRING} <= {*Interfaces.load().names("msg")}
+    nodes = valid_system(tmp_path, {"s.yaml": graph(TALKER, LISTENER)}).nodes
+    assert [node.full_name for node in nodes] == ["/a/talker", "/b/talker"]
+    names = [port.full_name for port in nodes[0].ports]
+    assert names == ["/a/chatter", "/a/talker/status", "/tf", "/b/tf", "/a/reset"]
 
 
 def test_comments_and_texts_cannot_break_out_of_their_places(tmp_path: Path) -> None:
@@ -149,11 +137,20 @@ publishers:
     )
 
 
-def test_types_of_the_graph_are_those_of_the_index() -> None:
-    assert STRING in Interfaces.load().names("msg")
-
-
 LARGE = 3_000_000
+
+
+LIMITS: list[tuple[str, object, dict[str, object]]] = [
+    ("bool", True, {"description": "\u202e"}),
+    ("integer", 3, {"minimum": 5, "maximum": 1}),
+    ("double", 3.0, {"minimum": 5.0}),
+    ("double_array", [1.0, 3.0], {"maximum": 2.0}),
+    ("integer", 3, {"minimum": 0, "step": 7}),
+    ("integer", 3, {"step": -1}),
+    ("double", 3.0, {"minimum": -math.inf, "maximum": math.nan}),
+    ("double", 0.3, {"minimum": 0.0, "step": 0.1}),
+]
+NAMES = ("exposure.1", "1st gain", "a..b.", "/topic", "", "a\x1b[2J", "${text}")
 
 
 @pytest.mark.slow  # megabytes are written and read
@@ -164,21 +161,8 @@ LARGE = 3_000_000
         ([FoundParameter("numbers", "integer_array", [1] * 300_000)], ["numbers"]),
         ([FoundParameter("broken", "string", "a\x1b[2J")], ["broken"]),
         ([FoundParameter("broken", "double_array", [1.0, math.nan])], ["broken"]),
-        (
-            [
-                FoundParameter(name, "integer", 1)
-                for name in ("exposure.1", "1st gain", "a..b.", "/topic", "", "a\x1b[2J", "${text}")
-            ],
-            ["", "a\x1b[2J", "${text}"],
-        ),
-        ([FoundParameter("described", "bool", True, {"description": "\u202e"})], []),
-        ([FoundParameter("a", "integer", 3, {"minimum": 5, "maximum": 1})], []),
-        ([FoundParameter("a", "double", 3.0, {"minimum": 5.0})], []),
-        ([FoundParameter("a", "double_array", [1.0, 3.0], {"maximum": 2.0})], []),
-        ([FoundParameter("a", "integer", 3, {"minimum": 0, "step": 7})], []),
-        ([FoundParameter("a", "integer", 3, {"step": -1})], []),
-        ([FoundParameter("a", "double", 3.0, {"minimum": -math.inf, "maximum": math.nan})], []),
-        ([FoundParameter("a", "double", 0.3, {"minimum": 0.0, "step": 0.1})], []),
+        ([FoundParameter(name, "integer", 1) for name in NAMES], ["", "a\x1b[2J", "${text}"]),
+        *(([FoundParameter("a", *limits)], []) for limits in LIMITS),
     ],
 )
 def test_what_a_file_cannot_hold_is_left_out(
@@ -187,12 +171,8 @@ def test_what_a_file_cannot_hold_is_left_out(
     small = FoundParameter("small", "integer", 1)
     node = FoundNode("driver", keys={"external": True}, parameters=(small, *parameters))
     found = readable(FoundSystem("large", (node,)))
-    path = tmp_path / "large.yaml"
-    path.write_text(write_system(found), encoding="utf-8")
-    result = load(path)
-    assert [item.message for item in result.diagnostics] == []
-    assert result.system is not None
-    names = {parameter.name.value for parameter in result.system.nodes[0].parameters}
+    [read] = valid_system(tmp_path, {"large.yaml": write_system(found)}).nodes
+    names = {parameter.name.value for parameter in read.parameters}
     assert "small" in names
     missing = [item.name for item in parameters if item.name not in names]
     assert missing == left_out
