@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from composer.interfaces import Action, FieldType, Interfaces, Message, Service, parts
+from composer.interfaces.index import similar_interface
 from composer.interfaces.sources import (
     Bundle,
     Prefix,
@@ -16,6 +17,7 @@ from composer.interfaces.sources import (
     installed_prefixes,
     read_description,
 )
+from tests.unit.support.checking import write_files
 
 BUNDLED = Interfaces([Bundle()])
 
@@ -34,9 +36,8 @@ def package(folder: Path, name: str, **files: str) -> Path:
 def prefix(root: Path, name: str, **files: str) -> Prefix:
     """Write a package as it is installed."""
     package(root / "share" / name, name, **files)
-    index = root / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
-    index.mkdir(parents=True, exist_ok=True)
-    (index / name).touch()
+    index = "share/ament_index/resource_index/rosidl_interfaces"
+    write_files(root, {f"{index}/{name}": ""})
     return Prefix(root)
 
 
@@ -50,6 +51,12 @@ def test_the_snapshot_has_what_systems_are_made_of() -> None:
     action = BUNDLED.find("composer_interfaces/action/Navigate")
     assert isinstance(action, Action)
     assert action.feedback.field_names == ("progress_percent", "current_position")
+    constants = BUNDLED.message("diagnostic_msgs/msg/DiagnosticStatus").constants
+    values = {constant.name: constant.value for constant in constants}
+    assert values == {"OK": 0, "WARN": 1, "ERROR": 2, "STALE": 3}
+    unknown = ("std_msgs/msg/Strin", "nowhere_msgs/msg/A", "std_msgs/String", "../../etc/msg/A")
+    for name in (*unknown, "", "a/b"):
+        assert (BUNDLED.find(name), BUNDLED.problem(name)) == (None, None), name
 
 
 def test_every_definition_of_the_snapshot_can_be_read_and_is_complete() -> None:
@@ -62,39 +69,12 @@ def test_every_definition_of_the_snapshot_can_be_read_and_is_complete() -> None:
                     assert field.type.is_primitive or BUNDLED.message(field.type.name), field
 
 
-def test_constants_are_known() -> None:
-    message = BUNDLED.message("diagnostic_msgs/msg/DiagnosticStatus")
-    assert message is not None
-    assert {constant.name: constant.value for constant in message.constants} == {
-        "OK": 0,
-        "WARN": 1,
-        "ERROR": 2,
-        "STALE": 3,
-    }
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["std_msgs/msg/Strin", "nowhere_msgs/msg/A", "std_msgs/String", "../../etc/msg/A", "", "a/b"],
-)
-def test_what_does_not_exist_is_not_found(name: str) -> None:
-    assert BUNDLED.find(name) is None
-    assert BUNDLED.problem(name) is None
-
-
 def test_project_wins_over_installed_wins_over_the_snapshot(tmp_path: Path) -> None:
     project = find_packages([package(tmp_path / "a", "std_msgs", msg_String="bool ours")])
     installed = prefix(tmp_path / "b", "std_msgs", msg_String="bool theirs", msg_Bool="bool theirs")
     interfaces = Interfaces([project, installed, Bundle()])
-
-    def first_field(name: str) -> str:
-        message = interfaces.message(name)
-        assert message is not None
-        return message.fields[0].name
-
-    assert first_field("std_msgs/msg/String") == "ours"
-    assert first_field("std_msgs/msg/Bool") == "theirs"
-    assert first_field("std_msgs/msg/Int8") == "data"
+    for name, first_field in (("String", "ours"), ("Bool", "theirs"), ("Int8", "data")):
+        assert interfaces.message(f"std_msgs/msg/{name}").fields[0].name == first_field
 
 
 def test_packages_are_found_below_a_folder_but_not_where_builds_are(tmp_path: Path) -> None:
@@ -112,17 +92,6 @@ def test_packages_are_found_below_a_folder_but_not_where_builds_are(tmp_path: Pa
     assert find_packages([tmp_path / "missing"]).packages() == frozenset()
 
 
-def test_a_definition_that_cannot_be_read_says_why(tmp_path: Path) -> None:
-    folder = package(tmp_path, "demo_msgs", msg_Bad="bool ok\nbool Not\n", msg_Good="bool ok")
-    interfaces = Interfaces([find_packages([tmp_path])])
-    assert interfaces.find("demo_msgs/msg/Bad") is None
-    problem = interfaces.problem("demo_msgs/msg/Bad")
-    assert problem is not None
-    assert (problem.path, problem.line) == (str(folder / "msg" / "Bad.msg"), 2)
-    assert problem.message.startswith("'Not' is not a field name")
-    assert interfaces.problem("demo_msgs/msg/Good") is None
-
-
 @pytest.mark.parametrize(
     ("content", "reason"),
     [(b"bool \xff", "it is not UTF-8"), (b"#" * 1_000_001, "it is larger than 1,000,000 bytes")],
@@ -136,16 +105,16 @@ def test_a_file_that_cannot_be_read_is_a_problem(
     assert interfaces.find("demo_msgs/msg/A") is None
     assert interfaces.text("demo_msgs/msg/A") is None
     problem = interfaces.problem("demo_msgs/msg/A")
-    assert problem is not None
     assert str(problem) == f"the definition of 'demo_msgs/msg/A' cannot be read: {reason}"
 
 
 def test_only_requested_packages_are_read(tmp_path: Path) -> None:
     installed = prefix(tmp_path, "demo_msgs", msg_A="bool a", msg_B="bool b")
     interfaces = Interfaces([installed])
-    (tmp_path / "share" / "demo_msgs" / "msg" / "B.msg").write_text("nonsense")
+    messages = tmp_path / "share" / "demo_msgs" / "msg"
+    (messages / "B.msg").write_text("nonsense")
     assert interfaces.find("demo_msgs/msg/A") is not None
-    (tmp_path / "share" / "demo_msgs" / "msg" / "A.msg").write_text("nonsense")
+    (messages / "A.msg").write_text("nonsense")
     assert interfaces.problem("demo_msgs/msg/A") is None  # read once
     assert interfaces.problem("demo_msgs/msg/B") is not None
 
@@ -158,43 +127,35 @@ def test_prefixes_come_from_the_environment_then_from_python(
     assert roots == [Path("/opt/overlay"), Path("/opt/ros/jazzy"), Path(sys.prefix)]
 
 
-def description(type_name: str, fields: list[dict[str, object]]) -> dict[str, object]:
-    return {"type_name": type_name, "fields": fields}
-
-
-def described_field(name: str, type_id: int, **more: object) -> dict[str, object]:
-    described = {"type_id": type_id, "capacity": 0, "string_capacity": 0, "nested_type_name": ""}
-    return {"name": name, "type": described | more, "default_value": ""}
-
-
 def test_a_package_without_msg_text_is_read_from_its_type_description(tmp_path: Path) -> None:
     installed = prefix(tmp_path, "idl_msgs", msg_Other="bool a")
+
+    def field(name: str, type_id: int, default: str = "", **more: object) -> dict[str, object]:
+        kind = {"type_id": type_id, "capacity": 0, "string_capacity": 0, "nested_type_name": ""}
+        return {"name": name, "type": kind | more, "default_value": default}
+
     fields = [
-        described_field("plain", 11),
-        described_field("fixed", 59, capacity=3),
-        described_field("bounded", 97, capacity=2, nested_type_name="idl_msgs/msg/Other"),
-        described_field("texts", 165, string_capacity=8),
-        described_field("data", 147),
+        field("plain", 11, "1.5"),
+        field("fixed", 59, capacity=3),
+        field("bounded", 97, capacity=2, nested_type_name="idl_msgs/msg/Other"),
+        field("texts", 165, string_capacity=8),
+        field("data", 147),
     ]
-    fields[0]["default_value"] = "1.5"
-    content = {
-        "type_description_msg": {
-            "type_description": description("idl_msgs/msg/Demo", fields),
-            "referenced_type_descriptions": [],
-        }
-    }
-    (tmp_path / "share" / "idl_msgs" / "msg" / "Demo.json").write_text(json.dumps(content))
+    description = {"type_name": "idl_msgs/msg/Demo", "fields": fields}
+    content = {"type_description": description, "referenced_type_descriptions": []}
+    (tmp_path / "share" / "idl_msgs" / "msg" / "Demo.json").write_text(
+        json.dumps({"type_description_msg": content})
+    )
     interfaces = Interfaces([installed])
     assert interfaces.names("msg") == ("idl_msgs/msg/Demo", "idl_msgs/msg/Other")
     message = interfaces.message("idl_msgs/msg/Demo")
-    assert message is not None
-    assert [(field.name, str(field.type)) for field in message.fields] == [
-        ("plain", "float64"),
-        ("fixed", "float64[3]"),
-        ("bounded", "idl_msgs/msg/Other[<=2]"),
-        ("texts", "string<=8[]"),
-        ("data", "uint8[]"),
-    ]
+    assert {field.name: str(field.type) for field in message.fields} == {
+        "plain": "float64",
+        "fixed": "float64[3]",
+        "bounded": "idl_msgs/msg/Other[<=2]",
+        "texts": "string<=8[]",
+        "data": "uint8[]",
+    }
     assert message.fields[0].default == 1.5
     assert message.fields[1].type.element == FieldType("float64")
 
@@ -206,29 +167,33 @@ def test_other_json_is_not_a_type_description(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("files", "message", "line"),
+    ("text", "message", "line"),
     [
-        ({"msg_Demo": "# a\nbool on\nOthr other\n"}, "field 'other' has the unknown type", 3),
-        ({"msg_Demo": "std_msgs/Heder header\n"}, "field 'header' has the unknown type", 1),
-        ({"msg_Demo": "bool on\nint33 x\n"}, "'int33' is neither a primitive type", 2),
-        ({"msg_Demo": "bool on\nOther other\n", "msg_Other": ""}, None, 0),
-        ({"msg_Demo": "elsewhere_msgs/Other other\n"}, None, 0),
-        ({"msg_Demo": "bool on\nstd_msgs/msg/Header h\n"}, "types are named without 'msg'", 2),
-        ({"msg_Demo": "std_msg/Header header\n"}, "field 'header' has the unknown type", 1),
-        ({"msg_Demo": "std_msg/Elsewhere header\n"}, None, 0),
-        ({"msg_Demo": "bool on\n---\nbool off\n"}, "a .msg file has 0 lines with '---'", 2),
+        ("# a\nbool on\nOthr other\n", "field 'other' has the unknown type", 3),
+        ("std_msgs/Heder header\n", "field 'header' has the unknown type", 1),
+        ("bool on\nint33 x\n", "'int33' is neither a primitive type", 2),
+        ("bool on\nbool Not\n", "'Not' is not a field name", 2),
+        ("bool on\nOther other\n", None, 0),
+        ("elsewhere_msgs/Other other\n", None, 0),
+        ("bool on\nstd_msgs/msg/Header h\n", "types are named without 'msg'", 2),
+        ("std_msg/Header header\n", "field 'header' has the unknown type", 1),
+        ("std_msg/Elsewhere header\n", None, 0),
+        ("bool on\n---\nbool off\n", "a .msg file has 0 lines with '---'", 2),
     ],
 )
-def test_wrong_types_of_fields_are_found(
-    tmp_path: Path, files: dict[str, str], message: str | None, line: int
+def test_mistakes_in_definitions_are_found(
+    tmp_path: Path, text: str, message: str | None, line: int
 ) -> None:
-    package(tmp_path / "demo", "demo_msgs", **files)
-    found = Interfaces.load([tmp_path])
-    problem = found.problem("demo_msgs/msg/Demo")
-    assert (problem is None) == (message is None)
-    assert (found.find("demo_msgs/msg/Demo") is None) == (message is not None)
-    if problem is not None and message is not None:
+    folder = package(tmp_path / "demo", "demo_msgs", msg_Demo=text, msg_Other="")
+    interfaces = Interfaces.load([tmp_path])
+    problem = interfaces.problem("demo_msgs/msg/Demo")
+    assert (interfaces.find("demo_msgs/msg/Demo") is None) == (message is not None)
+    assert interfaces.problem("demo_msgs/msg/Other") is None
+    if message is None:
+        assert problem is None
+    else:
         assert problem.message.startswith(message)
+        assert (problem.path, problem.line) == (str(folder / "msg" / "Demo.msg"), line)
         assert problem.place.endswith(f"demo/msg/Demo.msg:{line}")
 
 
@@ -249,15 +214,12 @@ def test_a_wrong_type_has_the_nearest_one_as_a_hint(
     tmp_path: Path, field: str, hint: str | None
 ) -> None:
     package(tmp_path / "demo", "demo_msgs", msg_Demo=f"{field}\n", msg_Other="bool on\n")
-    problem = Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo")
-    assert problem is not None
-    assert problem.hint == hint
+    assert Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo").hint == hint
 
 
 def test_an_error_in_the_type_of_a_field_is_found_where_it_is(tmp_path: Path) -> None:
     package(tmp_path / "demo", "demo_msgs", msg_Demo="Other other", msg_Other="bool on\nint33 x")
     problem = Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo")
-    assert problem is not None
     assert problem.place.endswith("demo/msg/Other.msg:2")
     assert (problem.span.line, problem.span.column, problem.span.length) == (2, 1, 7)
 
@@ -289,20 +251,42 @@ def test_changes_since_the_build_are_found(
     [
         ("string id\nFirst[] parts", "bool on", "First", 2),
         ("Second inner", "bool on\nFirst outer", "Second", 2),
+        ("Second a\nSecond b", "bool on", None, 0),  # may be used twice
     ],
-    ids=["directly", "through another"],
+    ids=["directly", "through another", "not at all"],
 )
 def test_a_message_must_not_contain_itself(
-    tmp_path: Path, first: str, second: str, name: str, line: int
+    tmp_path: Path, first: str, second: str, name: str | None, line: int
 ) -> None:
     folder = package(tmp_path / "demo", "demo", msg_First=first, msg_Second=second)
     interfaces = Interfaces([], find_packages([folder]))
     problem = interfaces.problem("demo/msg/First")
-    assert problem is not None
-    assert (problem.name, problem.line) == (f"demo/msg/{name}", line)
-    assert problem.message.endswith("makes the message contain itself")
+    if name is None:
+        assert problem is None
+        assert interfaces.find("demo/msg/First") is not None
+    else:
+        assert (problem.name, problem.line) == (f"demo/msg/{name}", line)
+        assert problem.message.endswith("makes the message contain itself")
 
 
-def test_a_message_may_be_used_twice(tmp_path: Path) -> None:
-    folder = package(tmp_path / "demo", "demo", msg_Pair="Item a\nItem b", msg_Item="bool on")
-    assert Interfaces([], find_packages([folder])).find("demo/msg/Pair") is not None
+KNOWN = ("nav_msgs/msg/Odometry", "std_msgs/msg/Empty", "std_msgs/msg/String", "std_srvs/srv/Empty")
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("std_msgs/msg/Strin", "did you mean 'std_msgs/msg/String'?"),
+        ("std_msgs/String", "did you mean 'std_msgs/msg/String'?"),
+        ("String", "did you mean 'std_msgs/msg/String'?"),
+        ("odometri", "did you mean 'nav_msgs/msg/Odometry'?"),
+        ("nav_msg/msg/Odometry", "did you mean 'nav_msgs/msg/Odometry'?"),
+        ("Empty", "valid here: std_msgs/msg/Empty, std_srvs/srv/Empty"),
+        ("std_msgs/msg/Odometry", "did you mean 'nav_msgs/msg/Odometry'?"),
+        ("std_msgs/msg/Quaternion", "valid here: std_msgs/msg/Empty, std_msgs/msg/String"),
+        ("acme/msg/Tile", None),
+        ("Xyzzy", None),
+        ("", None),
+    ],
+)
+def test_a_similar_interface_is_found_by_package_and_name(name: str, hint: str | None) -> None:
+    assert similar_interface(name, KNOWN) == hint

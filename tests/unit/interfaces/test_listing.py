@@ -1,12 +1,18 @@
+"""The text of interfaces, and the lists of files of the composer's own package."""
+
 from __future__ import annotations
 
+import re
+import tomllib
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+from composer.base.resources import interfaces_folder
 from composer.interfaces import Interfaces
 from composer.interfaces.listing import listing
-from composer.interfaces.sources import Prefix
+from tests.unit.interfaces.test_index import package, prefix
 
 OUTER = """\
 # outside
@@ -25,43 +31,35 @@ bool[] flags
 
 @pytest.fixture
 def interfaces(tmp_path: Path) -> Interfaces:
-    (tmp_path / "msg").mkdir()
-    (tmp_path / "srv").mkdir()
-    (tmp_path / "package.xml").write_text("<package><name>my_msgs</name></package>")
-    (tmp_path / "msg" / "Inner.msg").write_text(INNER)
-    (tmp_path / "msg" / "Outer.msg").write_text(OUTER)
-    (tmp_path / "srv" / "Ask.srv").write_text("Inner what\n---\n# why\nbool ok\n")
+    definitions = {"msg_Inner": INNER, "msg_Outer": OUTER}
+    package(tmp_path, "my_msgs", **definitions, srv_Ask="Inner what\n---\n# why\nbool ok\n")
     return Interfaces.load([tmp_path])
 
 
-@pytest.mark.parametrize(
-    ("comments", "expected"),
-    [
-        (
-            True,
-            "# outside\n\nInner[2] inner  # below\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\n"
-            "int8 LIMIT=1",
-        ),
-        (
-            False,
-            "Inner[2] inner\n\tint32 x 3\n\tbool[] flags\nstring name 'a'\nint8 LIMIT=1",
-        ),
-    ],
-)
-def test_comments_and_nested_messages(
-    interfaces: Interfaces, comments: bool, expected: str
-) -> None:
-    assert "\n".join(listing("my_msgs/msg/Outer", interfaces, comments=comments)) == expected
+WITH_COMMENTS = """\
+# outside
+
+Inner[2] inner  # below
+\tint32 x 3
+\tbool[] flags
+string name 'a'
+int8 LIMIT=1"""
+WITHOUT_COMMENTS = """\
+Inner[2] inner
+\tint32 x 3
+\tbool[] flags
+string name 'a'
+int8 LIMIT=1"""
 
 
-def test_services_keep_their_separator(interfaces: Interfaces) -> None:
-    shown = list(listing("my_msgs/srv/Ask", interfaces))
-    assert shown == ["Inner what", "\tint32 x 3", "\tbool[] flags", "---", "# why", "bool ok"]
-
-
-def test_a_definition_without_text_is_written_from_its_description(
+def test_comments_nested_messages_and_separators(
     interfaces: Interfaces, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    for comments, expected in ((True, WITH_COMMENTS), (False, WITHOUT_COMMENTS)):
+        assert "\n".join(listing("my_msgs/msg/Outer", interfaces, comments=comments)) == expected
+    shown = list(listing("my_msgs/srv/Ask", interfaces))
+    assert shown == ["Inner what", "\tint32 x 3", "\tbool[] flags", "---", "# why", "bool ok"]
+    # A definition without text is written from its description.
     monkeypatch.setattr(interfaces, "text", lambda _: None)
     assert list(listing("my_msgs/msg/Outer", interfaces)) == [
         "int8 LIMIT=1",
@@ -73,13 +71,28 @@ def test_a_definition_without_text_is_written_from_its_description(
 
 
 def test_a_message_that_contains_itself_is_expanded_once(tmp_path: Path) -> None:
-    folder = tmp_path / "share" / "my_msgs" / "msg"
-    index = tmp_path / "share" / "ament_index" / "resource_index" / "rosidl_interfaces"
-    folder.mkdir(parents=True)
-    index.mkdir(parents=True)
-    (index / "my_msgs").touch()
-    (folder / "Tree.msg").write_text("Leaf leaf\n")
-    (folder / "Leaf.msg").write_text("Tree tree\n")
-    interfaces = Interfaces([Prefix(tmp_path)])
-    shown = list(listing("my_msgs/msg/Tree", interfaces))
+    installed = prefix(tmp_path, "my_msgs", msg_Tree="Leaf leaf\n", msg_Leaf="Tree tree\n")
+    shown = list(listing("my_msgs/msg/Tree", Interfaces([installed])))
     assert shown == ["Leaf leaf", "\tTree tree"]
+
+
+FOLDER = interfaces_folder()
+
+
+def test_the_ament_package_lists_every_interface() -> None:
+    """It lists its files by hand, in a place that is easily forgotten."""
+    cmake = (FOLDER / "CMakeLists.txt").read_text("utf-8")
+    listed = re.findall(r'"(\w+/\w+\.(?:msg|srv|action))"', cmake)
+    files = [path for kind in ("msg", "srv", "action") for path in FOLDER.glob(f"*/*.{kind}")]
+    assert sorted(listed) == sorted(path.relative_to(FOLDER).as_posix() for path in files)
+
+
+def test_ament_and_pip_have_the_same_name_and_version_and_pinned_wheels() -> None:
+    package = ElementTree.parse(FOLDER / "package.xml").getroot()
+    settings = tomllib.loads((FOLDER / "pyproject.toml").read_text("utf-8"))
+    assert package.findtext("name") == settings["project"]["name"].replace("-", "_")
+    assert package.findtext("version") == settings["project"]["version"]
+    requires = settings["build-system"]["requires"]
+    wheels = [requirement for requirement in requires if requirement.startswith("ros-")]
+    assert wheels
+    assert [wheel for wheel in wheels if "==" not in wheel] == []

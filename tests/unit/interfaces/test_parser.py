@@ -29,6 +29,9 @@ def message(text: str) -> Message:
     return parsed
 
 
+LISTS = FieldType("int8", is_array=True)
+
+
 @pytest.mark.parametrize(
     ("line", "field"),
     [
@@ -37,7 +40,7 @@ def message(text: str) -> Message:
         ("  byte   b   # a comment", Field("b", FieldType("byte"))),
         ("char c", Field("c", FieldType("uint8"))),
         ("string<=5 s", Field("s", FieldType("string", string_bound=5))),
-        ("int8[] a", Field("a", FieldType("int8", is_array=True))),
+        ("int8[] a", Field("a", LISTS)),
         ("int8[3] a", Field("a", FieldType("int8", is_array=True, array_size=3))),
         ("int8[<=3] a", Field("a", FieldType("int8", is_array=True, array_bound=3))),
         (
@@ -56,18 +59,9 @@ def message(text: str) -> Message:
         ('string s "a b"', Field("s", FieldType("string"), "a b")),
         (r"string s 'it\'s'", Field("s", FieldType("string"), "it's")),
         ("string s a b", Field("s", FieldType("string"), "a b")),
-        ("int8[] a [1, -2]", Field("a", FieldType("int8", is_array=True), [1, -2])),
-        ("int8[] a []", Field("a", FieldType("int8", is_array=True), [])),
+        ("int8[] a [1, -2]", Field("a", LISTS, [1, -2])),
+        ("int8[] a []", Field("a", LISTS, [])),
         ("string[] a ['x, y', z]", Field("a", FieldType("string", is_array=True), ["x, y", "z"])),
-    ],
-)
-def test_field(line: str, field: Field) -> None:
-    assert message(line).fields == (field,)
-
-
-@pytest.mark.parametrize(
-    ("line", "constant"),
-    [
         ("uint8 LEFT=1", MessageConstant("LEFT", FieldType("uint8"), 1)),
         ("uint8 LEFT_2   =   255  # comment", MessageConstant("LEFT_2", FieldType("uint8"), 255)),
         ("float64 HALF=0.5", MessageConstant("HALF", FieldType("float64"), 0.5)),
@@ -75,12 +69,19 @@ def test_field(line: str, field: Field) -> None:
         ("bool ON=True", MessageConstant("ON", FieldType("bool"), True)),
     ],
 )
-def test_constant(line: str, constant: MessageConstant) -> None:
-    assert message(line).constants == (constant,)
+def test_a_line_is_a_field_or_a_constant(line: str, field: Field | MessageConstant) -> None:
+    definition = message(line)
+    assert (*definition.fields, *definition.constants) == (field,)
 
 
-def test_comments_and_empty_lines_define_nothing() -> None:
+def test_fields_are_found_by_name_and_types_are_shown_as_they_are_written() -> None:
     assert message("# only\n\n   # comments\r\n") == Message(NAME)
+    definition = message("bool a\nint8[<=2] b")
+    assert definition.field("b") == definition.fields[1]
+    assert definition.field("c") is None
+    assert definition.field_names == ("a", "b")
+    for text in ("bool", "string<=5", "int8[]", "int8[3]", "int8[<=3]", "string<=5[<=3]"):
+        assert str(message(f"{text} a").fields[0].type) == text
 
 
 def test_service_and_action_have_their_parts() -> None:
@@ -142,14 +143,12 @@ def test_a_wrong_separator_is_reported_where_it_is(line: str) -> None:
     assert caught.value.line == 2
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["String", "std_msgs/String", "std_msgs/msg/", "/msg/A", "../msg/A", "a/idl/A", "a/msg/a/b"],
-)
-def test_other_names_are_not_interfaces(name: str) -> None:
-    assert split_name(name) is None
-    with pytest.raises(ValueError, match="is not the name of an interface"):
-        parse_definition(name, "")
+def test_other_names_are_not_interfaces() -> None:
+    names = ("String", "std_msgs/String", "std_msgs/msg/", "/msg/A", "../msg/A", "a/idl/A")
+    for name in (*names, "a/msg/a/b"):
+        assert split_name(name) is None
+        with pytest.raises(ValueError, match="is not the name of an interface"):
+            parse_definition(name, "")
 
 
 def test_without_comments_the_meaning_stays() -> None:
@@ -158,20 +157,6 @@ def test_without_comments_the_meaning_stays() -> None:
     assert bare == "uint8 A = 1\n---\nstring<=3 s  'ab'"
     name = "demo_msgs/srv/Ask"
     assert parse_definition(name, bare) == parse_definition(name, text)
-
-
-def test_a_field_is_found_by_name() -> None:
-    definition = message("bool a\nint8[<=2] b")
-    assert definition.field("b") == definition.fields[1]
-    assert definition.field("c") is None
-    assert definition.field_names == ("a", "b")
-
-
-@pytest.mark.parametrize(
-    "text", ["bool", "string<=5", "int8[]", "int8[3]", "int8[<=3]", "string<=5[<=3]"]
-)
-def test_a_type_is_shown_as_it_is_written(text: str) -> None:
-    assert str(message(f"{text} a").fields[0].type) == text
 
 
 LARGE: dict[str, Callable[[int], str]] = {
