@@ -11,7 +11,6 @@ import sys
 from html.parser import HTMLParser
 
 from composer.base.resources import systems_folder
-from composer.graph.diagram import Graph
 from composer.graph.formats import html
 from composer.graph.output import Format, render
 from composer.graph.views import View, build_graph, scene_of
@@ -19,15 +18,10 @@ from composer.loading import load
 from tests.unit.graph.test_renderers import EVIL, evil_graph
 
 
-def page_of(*graphs: Graph) -> str:
-    return html.render(graphs)
-
-
-def pipeline_page() -> str:
-    loading = load(systems_folder() / "pipeline.yaml")
-    assert loading.system is not None
+def page_of(system: str) -> str:
+    loading = load(systems_folder() / f"{system}.yaml")
     scene = scene_of([loading.system], loading.diagnostics)
-    return page_of(*(build_graph(scene, view) for view in View))
+    return html.render([build_graph(scene, view) for view in View])
 
 
 class Elements(HTMLParser):
@@ -48,50 +42,32 @@ class Elements(HTMLParser):
         self.texts.append(data)
 
 
-def test_nothing_in_it_leads_elsewhere() -> None:
-    names = {name for name, _ in Elements(pipeline_page()).attributes}
+def test_nothing_in_it_leads_elsewhere_and_everything_that_can_be_clicked_has_an_article() -> None:
+    page = page_of("pipeline")
+    names = {name for name, _ in Elements(page).attributes}
     assert not names & {"src", "href", "xlink:href", "action", "srcset", "background"}
-    assert not re.search(r"https?://|@import|url\((?!#)", pipeline_page())
-
-
-def test_the_policy_allows_the_script_that_is_in_it_and_nothing_else() -> None:
-    page = pipeline_page()
+    assert not re.search(r"https?://|@import|url\((?!#)", page)
+    # The policy allows the script that is in it and nothing else.
     (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}';" in page
-
-
-def test_no_name_becomes_markup() -> None:
-    evil = Elements(page_of(evil_graph()))
-    harmless = Elements(page_of(build_graph(scene_of([]))))
-    assert set(evil.tags) - set(harmless.tags) <= {
-        "g",
-        "rect",
-        "text",
-        "title",
-        "article",
-        "p",
-        "h2",
-        "path",
-        "label",
-        "input",
-    }
-    assert "b" not in evil.tags
-    assert evil.texts.count(EVIL) >= 3
-
-
-def test_everything_that_can_be_clicked_has_its_article() -> None:
-    page = pipeline_page()
     articles = set(re.findall(r'data-about="([^"]*)"', page))
     keys = set(re.findall(r'data-key="([^"]*)"', page))
     assert keys
     assert keys <= articles
 
 
+def test_no_name_becomes_markup() -> None:
+    evil = Elements(html.render([evil_graph()]))
+    harmless = Elements(html.render([build_graph(scene_of([]))]))
+    added = {"g", "rect", "text", "title", "article", "p", "h2", "path", "label", "input"}
+    assert set(evil.tags) - set(harmless.tags) <= added
+    assert "b" not in evil.tags
+    assert evil.texts.count(EVIL) >= 3
+
+
 def test_the_chosen_view_is_the_one_that_is_shown() -> None:
-    loading = load(systems_folder() / "minimal.yaml")
-    assert loading.system is not None
-    scene = scene_of([loading.system])
+    scene = scene_of([load(systems_folder() / "minimal.yaml").system])
     graphs = [build_graph(scene, view) for view in View]
     page = render(graphs, Format.HTML, shown=2).decode()
     shown = re.findall(r'<section class="view" id="([^"]*)"[^>]*?(hidden)?>', page)

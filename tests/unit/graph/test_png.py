@@ -33,6 +33,8 @@ def test_resvg_draws_it_twice_as_large_as_it_is_laid_out() -> None:
     layout = arrange(graph)
     assert width == pytest.approx(2 * layout.size.width, abs=2)
     assert height > 2 * layout.size.height  # the title is above
+    # Text is drawn without the fonts of the SVG.
+    assert drawn(replace(graph, title="abcd")) != drawn(replace(graph, title="dcba"))
 
 
 def test_a_large_picture_does_not_take_all_memory(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -47,9 +49,3 @@ def test_a_missing_renderer_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(output, "find_spec", lambda name: None)
     with pytest.raises(PngMissing, match="needs resvg, which is not installed"):
         drawn(fleet_graph(3, View.NODES))
-
-
-def test_text_is_drawn_without_the_fonts_of_the_svg() -> None:
-    pytest.importorskip("resvg_py")
-    graph = fleet_graph(3, View.NODES)
-    assert drawn(replace(graph, title="abcd")) != drawn(replace(graph, title="dcba"))

@@ -70,11 +70,8 @@ def test_no_format_holds_control_characters(form: Format) -> None:
         assert json.loads(text)["title"] == HOSTILE
     if form is Format.SVG:
         ET.fromstring(text)
-
-
-def test_a_line_break_in_a_name_starts_no_line_of_mermaid() -> None:
-    lines = mermaid.render(graph_with(HOSTILE)).splitlines()
-    assert not any(line.startswith("%%") for line in lines)
+    if form is Format.MERMAID:  # a line break in a name starts no line
+        assert not any(line.startswith("%%") for line in text.splitlines())
 
 
 def test_svg_holds_the_texts_as_they_were() -> None:
@@ -84,28 +81,18 @@ def test_svg_holds_the_texts_as_they_were() -> None:
     assert EVIL in {title.text for title in root.iter(f"{SVG}title")}
 
 
-def check(form: str, text: str) -> None:
-    """Have the format's own reader look at the text."""
-    match form:
-        case "json":
-            json.loads(text)
-        case "svg":
-            ET.fromstring(text)
-        case "mermaid":
-            frames = re.findall(r"^ *subgraph ", text, re.MULTILINE)
-            assert len(frames) == len(re.findall(r"^ *end$", text, re.MULTILINE))
-
-
 @pytest.mark.parametrize(
     "path", sorted(systems_folder().glob("*.yaml")), ids=lambda path: path.stem
 )
-@pytest.mark.parametrize("view", list(View))
-def test_every_example_system_is_drawn_in_every_format(path: Path, view: View) -> None:
+def test_every_example_system_is_drawn_in_every_format(path: Path) -> None:
     loading = load(path)
-    assert loading.system is not None
-    graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
-    keys = {vertex.key for vertex in graph.vertices}
-    assert len(keys) == len(graph.vertices)
-    assert all({edge.source, edge.target} <= keys for edge in graph.edges)
-    for form in (Format.JSON, Format.SVG, Format.MERMAID):
-        check(form, render([graph], form).decode())
+    for view in View:
+        graph = build_graph(scene_of([loading.system], loading.diagnostics), view)
+        keys = {vertex.key for vertex in graph.vertices}
+        assert len(keys) == len(graph.vertices)
+        assert all({edge.source, edge.target} <= keys for edge in graph.edges)
+        json.loads(render([graph], Format.JSON))
+        ET.fromstring(render([graph], Format.SVG))
+        text = render([graph], Format.MERMAID).decode()
+        frames = re.findall(r"^ *subgraph ", text, re.MULTILINE)
+        assert len(frames) == len(re.findall(r"^ *end$", text, re.MULTILINE))

@@ -10,10 +10,10 @@ from pathlib import Path
 from composer.graph.diagram import Format, Graph, Problem
 from composer.graph.output import render
 from composer.graph.views import View, build_graph, live_scene_of, scene_of
-from composer.loading import load
 from composer.model import PortKind
 from composer.model.qos import QosProfile, Reliability
 from composer.plan.drift import ObservedEndpoint, ObservedNode, ObservedProcess, Snapshot
+from tests.unit.support.checking import load_project
 from tests.unit.support.resolving import system_of
 
 STRING = "std_msgs/msg/String"
@@ -38,21 +38,16 @@ def both(view: View) -> Graph:
     return build_graph(scene_of([system_of(TALKING), system_of(LISTENING)]), view)
 
 
-def test_several_systems_meet_on_their_topics() -> None:
+def test_several_systems_meet_on_their_topics_and_have_their_own_executors() -> None:
     graph = both(View.NODES)
     assert graph.title == "talking + listening"
     arrows = {(edge.source, edge.target) for edge in graph.edges}
     assert {("node:/talker", "topic:/chatter"), ("topic:/chatter", "node:/listener")} <= arrows
     lines = {vertex.key: vertex.lines for vertex in graph.vertices}
     assert lines["node:/listener"] == ("listener", "listening")
-
-
-def test_a_name_that_two_systems_give_is_one_node_to_ros_and_marked() -> None:
-    wrong = {item.key: item.problem for item in both(View.NODES).vertices if item.problem}
+    # A name that two systems give is one node to ROS.
+    wrong = {item.key: item.problem for item in graph.vertices if item.problem}
     assert wrong == {"node:/talker": Problem("two nodes are called '/talker'")}
-
-
-def test_each_system_has_its_own_executors() -> None:
     labels = [cluster.label for cluster in both(View.DEPLOYMENT).clusters]
     assert labels == [
         "talking · quick: single_threaded",
@@ -125,20 +120,15 @@ def test_processes_and_hosts_of_a_running_graph() -> None:
 
 def test_parameters_that_are_not_finite_are_yaml_text(tmp_path: Path) -> None:
     parameters = "{a: {type: double, default: 1.0}, b: {type: double_array, default: [1.0]}}"
-    text = f"system: s\nparameter_files: [p.yaml]\nnodes: {{n: {{parameters: {parameters}}}}}"
-    (tmp_path / "s.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "p.yaml").write_text(
-        "n: {ros__parameters: {a: -.inf, b: [.nan, .inf, 2.0]}}", encoding="utf-8"
-    )
-    system = load(tmp_path / "s.yaml").system
-    assert system is not None
-    graph = build_graph(scene_of([system]), View.NODES)
-    (vertex,) = json.loads(render([graph], Format.JSON))["vertices"]
-    assert vertex["details"]["parameters"] == {"a": "-.inf", "b": [".nan", ".inf", 2.0]}
-
-
-def test_live_parameters_that_are_not_finite_are_yaml_text() -> None:
-    snapshot = Snapshot((ObservedNode("/n", parameters={"a": math.nan}),))
-    graph = build_graph(live_scene_of(snapshot, {}), View.NODES)
-    (vertex,) = json.loads(render([graph], Format.JSON))["vertices"]
-    assert vertex["details"]["parameters"] == {"a": ".nan"}
+    files = {
+        "s.yaml": "system: s\nparameter_files: [p.yaml]\n"
+        f"nodes: {{n: {{parameters: {parameters}}}}}",
+        "p.yaml": "n: {ros__parameters: {a: -.inf, b: [.nan, .inf, 2.0]}}",
+    }
+    declared = scene_of([load_project(tmp_path, files).system])
+    live = live_scene_of(Snapshot((ObservedNode("/n", parameters={"a": math.nan}),)), {})
+    shown = []
+    for scene in (declared, live):
+        (vertex,) = json.loads(render([build_graph(scene)], Format.JSON))["vertices"]
+        shown.append(vertex["details"]["parameters"])
+    assert shown == [{"a": "-.inf", "b": [".nan", ".inf", 2.0]}, {"a": ".nan"}]

@@ -44,36 +44,39 @@ def test_what_git_and_docker_ignore_stays(tmp_path: Path) -> None:
     assert set(found.copied) == copied | (ignores.keys() - {"../.gitignore"}) | {"sub/build/x"}
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "mode", "stays"),
-    [
-        (".env", "A=1", 0o644, True),
-        ("sub/.env.local", "A=1", 0o644, True),
-        (".env.example", "A=1", 0o644, False),
-        ("sub/id_ed25519", "x", 0o644, True),
-        ("sub/notes.txt", PRIVATE_KEY, 0o644, True),
-        ("keystore/key.pem", "-----BEGIN PRIVATE KEY-----\n", 0o644, True),
-        ("cert.pem", "-----BEGIN CERTIFICATE-----\n", 0o644, False),
-        ("putty", "PuTTY-User-Key-File-3: ssh-ed25519\n", 0o644, True),
-        ("deploy.key", "binary", 0o600, True),
-        ("deploy.key", "binary", 0o644, False),
-        ("api_token", "x", 0o400, True),
-        ("private/hidden", '{"k": "-----BEGIN PRIVATE KEY-----"}', 0o600, True),
-        ("robot.json", '{"k": "-----BEGIN PRIVATE KEY-----"}', 0o644, False),
-        ("secret.yaml", "k: |\n  -----BEGIN RSA PRIVATE KEY-----\n", 0o644, True),
-        ("bom", "\ufeff-----BEGIN PRIVATE KEY-----\n", 0o644, True),
-        ("deploykey", "x", 0o600, True),
-        ("wifi_password.yaml", "x", 0o600, True),
-        ("teleop_keys.yaml", "x", 0o600, False),
-        ("key\n", "x", 0o600, False),
-        ("key_teleop.py", "x", 0o600, False),
-        ("robot.yaml", "system: r\n", 0o600, False),
-        ("docs.md", "a line `-----BEGIN PRIVATE KEY-----`", 0o644, False),
-    ],
-)
-def test_secrets_stay(tmp_path: Path, name: str, text: str, mode: int, stays: bool) -> None:
-    write(tmp_path, {name: text}, mode)
-    assert staying(tmp_path) == ({name} if stays else set())
+#: Files that stay, with their mode, and files that are copied.
+SECRETS = [
+    (".env", "A=1", 0o644),
+    ("sub/.env.local", "A=1", 0o644),
+    ("sub/id_ed25519", "x", 0o644),
+    ("sub/notes.txt", PRIVATE_KEY, 0o644),
+    ("keystore/key.pem", "-----BEGIN PRIVATE KEY-----\n", 0o644),
+    ("putty", "PuTTY-User-Key-File-3: ssh-ed25519\n", 0o644),
+    ("deploy.key", "binary", 0o600),
+    ("api_token", "x", 0o400),
+    ("private/hidden", '{"k": "-----BEGIN PRIVATE KEY-----"}', 0o600),
+    ("secret.yaml", "k: |\n  -----BEGIN RSA PRIVATE KEY-----\n", 0o644),
+    ("bom", "\ufeff-----BEGIN PRIVATE KEY-----\n", 0o644),
+    ("deploykey", "x", 0o600),
+    ("wifi_password.yaml", "x", 0o600),
+]
+OTHERS = [
+    (".env.example", "A=1", 0o644),
+    ("cert.pem", "-----BEGIN CERTIFICATE-----\n", 0o644),
+    ("other.key", "binary", 0o644),
+    ("robot.json", '{"k": "-----BEGIN PRIVATE KEY-----"}', 0o644),
+    ("teleop_keys.yaml", "x", 0o600),
+    ("key\n", "x", 0o600),
+    ("key_teleop.py", "x", 0o600),
+    ("robot.yaml", "system: r\n", 0o600),
+    ("docs.md", "a line `-----BEGIN PRIVATE KEY-----`", 0o644),
+]
+
+
+def test_secrets_stay(tmp_path: Path) -> None:
+    for name, text, mode in SECRETS + OTHERS:
+        write(tmp_path, {name: text}, mode)
+    assert staying(tmp_path) == {name for name, *_ in SECRETS}
 
 
 def test_files_of_a_folder_that_only_its_owner_enters_are_like_keys(tmp_path: Path) -> None:
@@ -125,9 +128,8 @@ def test_private_keys_of_hosts_stay(
     assert staying(root, root / "later") == {"later"}
 
 
+@pytest.mark.skipif(shutil.which("rsync") is None, reason="rsync is not installed")
 def test_rsync_copies_exactly_what_is_listed(tmp_path: Path) -> None:
-    if shutil.which("rsync") is None:
-        pytest.skip("rsync is not installed")
     root, there = tmp_path / "robot", tmp_path / "there"
     odd = [
         "a b ",

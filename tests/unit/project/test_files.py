@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from composer.project.files import find_files
+from tests.unit.support.checking import write_files
 
 
 @pytest.mark.parametrize(
@@ -36,13 +37,12 @@ def test_a_folder_gives_only_what_is_ours(tmp_path: Path, name: str, text: str, 
 
 
 def test_a_folder_is_searched_below_in_order_and_hidden_folders_are_not(tmp_path: Path) -> None:
-    for name in ("b/c.yaml", "a.yaml", ".venv/d.yaml", "b/a/e.yaml", "b/.hidden.yaml"):
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("system: a\n")
+    names = ["a.yaml", "b/a/e.yaml", "b/c.yaml"]
+    hidden = [".venv/d.yaml", "b/.hidden.yaml"]
+    write_files(tmp_path, dict.fromkeys([*names, *hidden], "system: a\n"))
     (tmp_path / "loop").symlink_to(tmp_path)
-    names = [str(path.relative_to(tmp_path)) for path in find_files([tmp_path]).files]
-    assert names == ["a.yaml", "b/a/e.yaml", "b/c.yaml"]
+    found = find_files([tmp_path]).files
+    assert [str(path.relative_to(tmp_path)) for path in found] == names
 
 
 def test_what_is_named_is_returned_as_it_is_and_once(tmp_path: Path) -> None:
@@ -53,39 +53,26 @@ def test_what_is_named_is_returned_as_it_is_and_once(tmp_path: Path) -> None:
     assert find_files([foreign, missing, foreign, too_long]).files == (foreign, missing, too_long)
 
 
-@pytest.mark.parametrize(
-    "made",
-    ["COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg", "node_modules", "lib/site-packages"],
-)
-def test_what_tools_made_is_left_alone(tmp_path: Path, made: str) -> None:
-    folder = tmp_path / "made"
-    if made.isupper() or "." in made:
-        folder.mkdir()
-        (folder / made).touch()
-    else:
-        folder = folder / made
-        folder.mkdir(parents=True)
-    (folder / "a.yaml").write_text("system: a\n")
+@pytest.mark.parametrize("mark", ["COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"])
+def test_a_folder_that_is_marked_is_left_alone(tmp_path: Path, mark: str) -> None:
+    write_files(tmp_path, {f"made/{mark}": "", "made/a.yaml": "system: a\n"})
     assert find_files([tmp_path]).files == ()
-    if folder.name == "made":
-        assert find_files([folder]).files == (folder / "a.yaml",), "who names it, means it"
+    named = tmp_path / "made"
+    assert find_files([named]).files == (named / "a.yaml",), "who names it, means it"
 
 
-def test_yaml_files_of_other_programs_are_listed_separately(tmp_path: Path) -> None:
-    (tmp_path / "other.yaml").write_text("services: {}\n")
-    (tmp_path / "composer.yaml").write_text("strict: true\n")
+def test_installed_packages_and_files_of_other_programs_are_not_checked(tmp_path: Path) -> None:
+    for folder in ("node_modules", "lib/site-packages"):
+        write_files(tmp_path, {f"{folder}/a.yaml": "system: a\n"})
+    foreign = {
+        "other.yaml": "services: {}\n",
+        # Parameter files of nodes with such names.
+        "p1.yaml": "node:\n  ros__parameters: {a: 1}\n",
+        "p2.yaml": "# all\nsystem: {ros__parameters: {a: 1}}\n",
+    }
+    write_files(tmp_path, {**foreign, "composer.yaml": "strict: true\n"})
     found = find_files([tmp_path])
-    assert (found.files, found.foreign) == ((), (tmp_path / "other.yaml",))
-
-
-@pytest.mark.parametrize(
-    "text", ["node:\n  ros__parameters: {a: 1}\n", "# all\nsystem: {ros__parameters: {a: 1}}\n"]
-)
-def test_parameter_files_of_a_node_with_such_a_name_are_not_checked(
-    tmp_path: Path, text: str
-) -> None:
-    (tmp_path / "parameters.yaml").write_text(text)
-    assert find_files([tmp_path]).foreign == (tmp_path / "parameters.yaml",)
+    assert (found.files, found.foreign) == ((), tuple(tmp_path / name for name in foreign))
 
 
 def test_links_are_followed_in_the_project_only(

@@ -7,27 +7,25 @@ from pathlib import Path
 
 import pytest
 
-from composer.loading import load
 from composer.project import Project
 from composer.project.node_types import NodeTypes, installed_projects, installed_systems
 from tests.cli.compose import compose
+from tests.unit.support.checking import valid_system, write_files
 
 
 def install(prefix: Path, package: str, *, registered: bool = True) -> Path:
     """Create an installed package with the node type 'blinker' and the system 'blink'."""
     share = prefix / "share" / package
-    for folder in ("nodes", "systems"):
-        (share / folder).mkdir(parents=True)
-    (share / "nodes" / "blinker.yaml").write_text(
-        f"node: blinker\ndescription: of {package}\nbehavior: blinker:Blinker\n"
-        "timers: {tick: {period_ms: 100}}\n"
-    )
-    (share / "nodes" / "blinker.py").write_text("class Blinker:\n    def on_tick(self): pass\n")
-    (share / "systems" / "blink.yaml").write_text("system: blink\nnodes: {a: {type: blinker}}\n")
+    files = {
+        "nodes/blinker.yaml": f"node: blinker\ndescription: of {package}\n"
+        "behavior: blinker:Blinker\ntimers: {tick: {period_ms: 100}}\n",
+        "nodes/blinker.py": "class Blinker:\n    def on_tick(self): pass\n",
+        "systems/blink.yaml": "system: blink\nnodes: {a: {type: blinker}}\n",
+    }
+    write_files(share, files)
     if registered:
-        index = prefix / "share" / "ament_index" / "resource_index" / "ros2_composer"
-        index.mkdir(parents=True, exist_ok=True)
-        (index / package).touch()
+        index = "share/ament_index/resource_index/ros2_composer"
+        write_files(prefix, {f"{index}/{package}": ""})
     return share
 
 
@@ -73,12 +71,8 @@ def test_a_system_uses_an_installed_type_with_its_behavior(
     prefixes: tuple[Path, Path], tmp_path: Path
 ) -> None:
     install(prefixes[0], "lamps")
-    path = tmp_path / "home" / "own.yaml"
-    path.write_text("system: own\nnodes: {lamp: {type: blinker}}\n")
-    result = load(path)
-    assert list(result.diagnostics) == []
-    assert result.system is not None
-    (node,) = result.system.nodes
+    text = "system: own\nnodes: {lamp: {type: blinker}}\n"
+    (node,) = valid_system(tmp_path / "home", {"own.yaml": text}).nodes
     assert node.description == "of lamps"
     done = compose("run", "lamps/blink", "--dry-run")
     assert done.code == 0, done.err

@@ -22,15 +22,9 @@ def test_types_come_from_the_project_and_from_the_composer(project: Path) -> Non
     assert node_types.find("camera") == project / "nodes" / "camera.yaml"
     assert node_types.find("relay") == nodes_folder() / "relay.yaml"
     assert {"camera", "relay"} <= set(node_types.names())
-
-
-def test_the_projects_own_type_wins(project: Path) -> None:
+    # The project's own type wins, and the nearest folder of types.
     (project / "nodes" / "relay.yaml").write_text("node: relay\n")
-    found = NodeTypes.of(Project.at(project)).find("relay")
-    assert found == project / "nodes" / "relay.yaml"
-
-
-def test_the_nearest_nodes_folder_is_the_projects(project: Path) -> None:
+    assert NodeTypes.of(Project.at(project)).find("relay") == project / "nodes" / "relay.yaml"
     nearer = project / "systems" / "nodes"
     nearer.mkdir()
     node_types = NodeTypes.of(Project.at(project / "systems"))
@@ -38,47 +32,33 @@ def test_the_nearest_nodes_folder_is_the_projects(project: Path) -> None:
     assert node_types.find("camera") is None
 
 
-@pytest.mark.parametrize(
-    "name", ["", "..", "../secret", "/etc/passwd", "a.b", "camera\n", "a" * 5000, "ca mera", "\0"]
-)
-def test_a_type_name_never_leads_out_of_the_folder(project: Path, name: str) -> None:
+def test_a_type_name_never_leads_out_of_the_folder(project: Path) -> None:
     (project / "secret.yaml").write_text("node: secret\n")
-    assert NodeTypes.of(Project.at(project)).find(name) is None
-
-
-def test_a_link_may_lead_about_in_the_project(project: Path) -> None:
-    (project / "shared.yaml").write_text("node: shared\n")
-    link = project / "nodes" / "shared.yaml"
-    link.symlink_to(project / "shared.yaml")
     node_types = NodeTypes.of(Project.at(project))
-    assert node_types.find("shared") == link
-    assert node_types.find_outside_project("shared") is None
+    for name in ("", "..", "../secret", "/etc/passwd", "a.b", "camera\n", "ca mera", "\0"):
+        assert node_types.find(name) is None
+    assert node_types.find("a" * 5000) is None
 
 
-def test_a_link_does_not_lead_out_of_the_project(
+def test_links_may_lead_about_in_the_project_only(
     project: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    secret = tmp_path_factory.mktemp("elsewhere") / "secret.yaml"
-    secret.write_text("node: relay\n")
-    # Not the composer's own of that name either: it is not what is meant.
-    link = project / "nodes" / "relay.yaml"
-    link.symlink_to(secret)
+    elsewhere = tmp_path_factory.mktemp("elsewhere")  # it has the composer's types only
+    assert NodeTypes.of(Project.at(elsewhere)).folders == (nodes_folder(),)
+    (elsewhere / "secret.yaml").write_text("node: relay\n")
+    (project / "shared.yaml").write_text("node: shared\n")
+    shared, relay = (project / "nodes" / name for name in ("shared.yaml", "relay.yaml"))
+    shared.symlink_to(project / "shared.yaml")
+    relay.symlink_to(elsewhere / "secret.yaml")
     node_types = NodeTypes.of(Project.at(project))
+    assert node_types.find("shared") == shared
+    assert node_types.find_outside_project("shared") is None
+    # Not the composer's own of that name either: it is not what is meant.
     assert node_types.find("relay") is None
-    assert node_types.find_outside_project("relay") == link
-
-
-def test_a_folder_of_node_types_does_not_lead_out_of_the_project_either(
-    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    elsewhere = tmp_path_factory.mktemp("elsewhere")
-    (elsewhere / "secret.yaml").write_text("node: secret\n")
-    (tmp_path / "nodes").symlink_to(elsewhere)
-    assert NodeTypes.of(Project.at(tmp_path)).find("secret") is None
-
-
-def test_a_file_without_project_sees_the_composers_types(tmp_path: Path) -> None:
-    assert NodeTypes.of(Project.at(tmp_path)).folders == (nodes_folder(),)
+    assert node_types.find_outside_project("relay") == relay
+    other = project / "systems" / "deep"
+    (other / "nodes").symlink_to(elsewhere)
+    assert NodeTypes.of(Project.at(other)).find("secret") is None
 
 
 def test_interfaces_of_the_project_come_first(project: Path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.diagnostics import Diagnostic
 from composer.project import Project
 
 OTHER_USER, THIRD_USER = 65534, 65533
@@ -28,13 +27,6 @@ def give_away(path: Path, owner: int = OTHER_USER) -> Path:
     return path
 
 
-def controlled(diagnostics: tuple[Diagnostic, ...]) -> list[str]:
-    return [
-        f"{item.rule.name} {Path(item.primary.file.path).name}: {item.message}"
-        for item in diagnostics
-    ]
-
-
 @needs_root
 @pytest.mark.parametrize("name", ["nodes", "interfaces", "composer.yaml"])
 def test_what_another_user_has_put_into_a_parent_folder_is_not_used(
@@ -50,37 +42,35 @@ def test_what_another_user_has_put_into_a_parent_folder_is_not_used(
     project = Project.at(mine)
     assert (project.root, project.settings.strict) == (mine.parent, False)
     assert project.node_folders == project.interface_folders == ()
-    name_of_user = f"'{pwd.getpwuid(OTHER_USER).pw_name}'"
-    assert controlled(project.diagnostics) == [
-        f"foreign-owner {name}: '{name}' is not used: user {name_of_user} controls it"
-    ]
-    assert str(project.diagnostics[0].hint).endswith(f"set COMPOSE_SAFE_FOLDERS={tmp_path}")
+    [diagnostic] = project.diagnostics
+    assert (diagnostic.rule.name, Path(diagnostic.primary.file.path).name) == (
+        "foreign-owner",
+        name,
+    )
+    user = f"user '{pwd.getpwuid(OTHER_USER).pw_name}'"
+    assert diagnostic.message == f"'{name}' is not used: {user} controls it"
+    assert str(diagnostic.hint).endswith(f"set COMPOSE_SAFE_FOLDERS={tmp_path}")
 
 
 @needs_root
-def test_what_is_in_a_folder_of_another_user_is_not_used(tmp_path: Path, mine: Path) -> None:
-    (tmp_path / "nodes").mkdir()
-    give_away(tmp_path)
-    project = Project.at(mine)
-    assert project.node_folders == ()
-    assert len(project.diagnostics) == 1
-
-
-@needs_root
-def test_a_link_of_another_user_is_not_used(tmp_path: Path, mine: Path) -> None:
+@pytest.mark.parametrize("given", ["the parent folder", "a link"])
+def test_what_is_in_a_folder_or_behind_a_link_of_another_user_is_not_used(
+    tmp_path: Path, mine: Path, given: str
+) -> None:
     (tmp_path / "drafts").mkdir()
-    (tmp_path / "nodes").symlink_to(tmp_path / "drafts")
-    give_away(tmp_path / "nodes")
-    assert Project.at(mine).node_folders == ()
-
-
-@needs_root
-def test_a_project_below_the_folder_of_another_user_is_complete(tmp_path: Path, mine: Path) -> None:
-    for folder in (mine.parent / "nodes", tmp_path / "nodes"):
-        folder.mkdir()
-    give_away(tmp_path)
+    if given == "a link":
+        (tmp_path / "nodes").symlink_to(tmp_path / "drafts")
+        give_away(tmp_path / "nodes")
+    else:
+        (tmp_path / "nodes").mkdir()
+        give_away(tmp_path)
     project = Project.at(mine)
-    assert (project.root, project.node_folders) == (mine.parent, (mine.parent / "nodes",))
+    assert (project.node_folders, len(project.diagnostics)) == ((), 1)
+    # A project below is complete.
+    nodes = mine.parent / "nodes"
+    nodes.mkdir()
+    project = Project.at(mine)
+    assert (project.root, project.node_folders) == (mine.parent, (nodes,))
     assert project.diagnostics == ()
 
 
@@ -97,29 +87,28 @@ def test_root_may_use_a_project_whose_owner_is_another_user(tmp_path: Path, mine
 
 
 @needs_root
-def test_the_user_who_called_sudo_is_trusted(
-    tmp_path: Path, mine: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("variable", "value", "is_used"),
+    [
+        ("SUDO_UID", str(OTHER_USER), True),
+        ("SUDO_UID", str(THIRD_USER), False),
+        ("SUDO_UID", "65534 ", False),
+        ("SUDO_UID", "", False),
+        ("COMPOSE_SAFE_FOLDERS", "/opt:{}", True),
+        ("COMPOSE_SAFE_FOLDERS", "*", True),
+        ("COMPOSE_SAFE_FOLDERS", "{}/nodes", False),
+    ],
+)
+def test_the_user_who_called_sudo_is_trusted_and_folders_can_be_declared_safe(
+    variable: str,
+    value: str,
+    is_used: bool,
+    tmp_path: Path,
+    mine: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     nodes = tmp_path / "nodes"
     nodes.mkdir()
     give_away(nodes)
-    for caller, used in (
-        (str(OTHER_USER), (nodes,)),
-        (str(THIRD_USER), ()),
-        ("65534 ", ()),
-        ("", ()),
-    ):
-        monkeypatch.setenv("SUDO_UID", caller)
-        assert Project.at(mine).node_folders == used
-
-
-@needs_root
-def test_folders_can_be_declared_safe(
-    tmp_path: Path, mine: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    nodes = tmp_path / "nodes"
-    nodes.mkdir()
-    give_away(nodes)
-    for safe, used in ((f"/opt:{tmp_path}", (nodes,)), ("*", (nodes,)), (f"{tmp_path}/nodes", ())):
-        monkeypatch.setenv("COMPOSE_SAFE_FOLDERS", safe)
-        assert Project.at(mine).node_folders == used
+    monkeypatch.setenv(variable, value.replace("{}", str(tmp_path)))
+    assert Project.at(mine).node_folders == ((nodes,) if is_used else ())

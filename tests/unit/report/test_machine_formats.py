@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from dataclasses import replace
 from typing import Any
 
@@ -25,16 +26,12 @@ def example() -> list[Diagnostic]:
     return [first, replace(first, message="again"), second]
 
 
-def test_json_matches_its_schema() -> None:
+def test_json_is_complete_and_matches_its_schema() -> None:
     schema = json.loads((schemas_folder() / "report.schema.json").read_text(encoding="utf-8"))
     Draft7Validator.check_schema(schema)
     for diagnostics in ([], example()):
         report = json.loads(render_json(diagnostics))
         assert list(Draft7Validator(schema).iter_errors(report)) == []
-
-
-def test_json_is_complete() -> None:
-    report = json.loads(render_json(example()))
     assert report["summary"] == {"errors": 2, "warnings": 0, "infos": 1}
     assert report["diagnostics"][0] == {
         "code": "RC202",
@@ -49,14 +46,14 @@ def test_json_is_complete() -> None:
     assert [label["message"] for label in report["diagnostics"][2]["related"]] == ["this one"]
 
 
-def sarif_log(diagnostics: list[Diagnostic]) -> dict[str, Any]:
-    log: dict[str, Any] = json.loads(render_sarif(diagnostics))
-    return log
+def sarif_results(diagnostics: list[Diagnostic]) -> list[dict[str, Any]]:
+    return json.loads(render_sarif(diagnostics))["runs"][0]["results"]
 
 
-def test_sarif_has_the_places() -> None:
+def test_sarif_has_the_places_the_level_and_the_hint() -> None:
     found = example()
-    for shown, result in zip(found, sarif_log(found)["runs"][0]["results"], strict=True):
+    results = sarif_results(found)
+    for shown, result in zip(found, results, strict=True):
         spans = [shown.primary, *(label.span for label in shown.related)]
         places = [*result["locations"], *result.get("relatedLocations", ())]
         assert [place["physicalLocation"]["region"] for place in places] == [
@@ -68,10 +65,6 @@ def test_sarif_has_the_places() -> None:
             for span in spans
         ]
         assert [place.get("id") for place in places] == [None, *range(1, len(places))]
-
-
-def test_sarif_has_the_level_and_the_hint() -> None:
-    results = sarif_log(example())["runs"][0]["results"]
     assert [result["level"] for result in results] == ["error", "error", "note"]
     assert results[0]["message"]["text"] == "there is no 'relai'\ndid you mean 'relay'?"
 
@@ -87,28 +80,21 @@ def test_sarif_has_the_level_and_the_hint() -> None:
     ],
 )
 def test_sarif_paths_are_uri_references(path: str, uri: str) -> None:
-    [result] = sarif_log([diagnostic(TEXT, "demo", path=path)])["runs"][0]["results"]
+    [result] = sarif_results([diagnostic(TEXT, "demo", path=path)])
     assert result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == uri
 
 
-def moved(found: Diagnostic, lines_added: int, indentation: int) -> Diagnostic:
+def moved(found: Diagnostic) -> Diagnostic:
+    """Return the diagnostic as it is in a file with more lines above and deeper indentation."""
     span = found.primary
-    text = "\n" * lines_added + "\n".join(
-        f"{' ' * indentation}{line}" for line in span.file.text.split("\n")
-    )
-    place = Span(
-        SourceFile(span.file.path, text),
-        span.line + lines_added,
-        span.column + indentation,
-        span.length,
-    )
-    return replace(found, primary=place)
+    text = "\n" * 7 + textwrap.indent(span.file.text, "    ")
+    file = SourceFile(span.file.path, text)
+    return replace(found, primary=Span(file, span.line + 7, span.column + 4, span.length))
 
 
 def test_fingerprints_survive_lines_added_above_and_deeper_indentation() -> None:
     before = example()
-    after = [moved(found, lines_added=7, indentation=4) for found in before]
-    assert fingerprints(before) == fingerprints(after)
+    assert fingerprints(before) == fingerprints([moved(found) for found in before])
 
 
 def test_fingerprints_are_unique() -> None:

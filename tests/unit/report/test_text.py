@@ -41,19 +41,16 @@ def test_long_lines_are_truncated() -> None:
     assert max(len(line) for line in report.splitlines()) < 140
 
 
-def test_a_value_longer_than_the_line_is_marked_to_its_end() -> None:
-    source = SourceFile("demo.yaml", "text: |\n  much")
-    found = replace(diagnostic("a", "a"), primary=Span(source, 1, 7, 500))
-    assert marked_cells(render([found])) == 1
-
-
-def marked_cells(report: str) -> int:
-    return report.splitlines()[4].count("^")
-
-
-def test_a_span_after_the_end_of_the_text_is_shown() -> None:
-    found = replace(diagnostic("a", "a"), primary=Span(SourceFile("empty.yaml", ""), 1, 1, 1))
-    assert render([found]).splitlines()[1:5] == [" --> empty.yaml:1:1", "  |", "1 |", "  | ^"]
+@pytest.mark.parametrize(
+    ("text", "span", "marks"), [("text: |\n  much", (1, 7, 500), "       ^"), ("", (1, 1, 1), " ^")]
+)
+def test_a_value_that_ends_behind_the_line_is_marked_to_the_end_of_the_line(
+    text: str, span: tuple[int, int, int], marks: str
+) -> None:
+    found = replace(diagnostic("a", "a"), primary=Span(SourceFile("a.yaml", text), *span))
+    lines = render([found]).splitlines()[1:5]
+    line = text.split("\n", maxsplit=1)[0]
+    assert lines == [f" --> a.yaml:1:{span[1]}", "  |", f"1 | {line}".strip(), f"  |{marks}"]
 
 
 def test_messages_hints_paths_and_labels_are_escaped() -> None:
