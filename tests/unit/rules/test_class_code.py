@@ -158,34 +158,3 @@ def test_only_what_hosting_surely_refuses_is_an_error(tmp_path: Path) -> None:
     for case, found in zip(REFUSED, results, strict=True):
         assert [item.rule.severity for item in found] == case[1], case
     assert {item.rule.name for found in results for item in found} == {"unsupported-class"}
-
-
-ALTERNATIVES = """\
-import os
-
-from rclpy.node import Node
-
-OLD = os.environ.get("ROS_DISTRO", "humble") == "humble"
-if OLD:
-    from geometry_msgs.msg import Twist as Command
-else:
-    from geometry_msgs.msg import TwistStamped as Command
-
-
-class Robot(Node):
-    def __init__(self):
-        super().__init__("robot")
-        self.commands = self.create_publisher(Command, "cmd_vel", 10)
-
-    def send(self):
-        command = Command()
-        if OLD:
-            command.linear.x = 0.1
-        else:
-            command.twist.linear.x = 0.1
-        self.commands.publish(command)
-"""
-
-
-def test_alternative_messages_are_not_checked(tmp_path: Path) -> None:
-    assert _found(tmp_path, ALTERNATIVES) == [[("not-checked", "Twist")]]
