@@ -14,35 +14,36 @@ from composer.bridges.importing.found import FoundSystem
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
 from composer.launch.variants import all_visits, mark
-from composer.loading import load, load_files
 from composer.model.resolve import OverrideOptions
 from tests.unit.bridges.importing.test_launch_file import node
+from tests.unit.support.checking import load_project
 
-Nodes = Callable[[Mapping[str, str]], list[dict[str, Any]]]
+Values = Mapping[str, str]
+Described = list[dict[str, Any]]
+Nodes = Callable[[Values], Described]
+COMPONENT = {"package": "demo", "plugin": "demo::Camera"}
 
 
 def argument(name: str, default: str | None, *choices: str) -> dict[str, Any]:
-    value = {
-        "default": default,
-        "value": default if default is not None else [*choices, mark(name)][0],
-    }
-    return {"name": name, **value, "description": "", "choices": list(choices)}
+    value = default if default is not None else [*choices, mark(name)][0]
+    item = {"name": name, "default": default, "value": value, "description": ""}
+    return {**item, "choices": list(choices)}
+
+
+def switches(*names: str, default: str = "false") -> Described:
+    return [argument(name, default) for name in names]
 
 
 def described(nodes: Nodes, *arguments: dict[str, Any], **compared: list[str]) -> FoundSystem:
     """Return the description of a launch file that has ``nodes(values)``."""
     defaults = {item["name"]: item["value"] for item in arguments}
 
-    def visit(values: Mapping[str, str]) -> dict[str, Any]:
+    def visit(values: Values) -> dict[str, Any]:
         declared = [
             {**item, "value": values.get(item["name"], item["value"])} for item in arguments
         ]
-        return {
-            "nodes": nodes({**defaults, **values}),
-            "left_out": [],
-            "arguments": declared,
-            "compared": compared,
-        }
+        found = {"nodes": nodes({**defaults, **values}), "arguments": declared}
+        return {**found, "left_out": [], "compared": compared}
 
     return describe_launch_file("s", "f.launch.py", (), all_visits(visit, {}))
 
@@ -55,43 +56,38 @@ def visited(
     return yaml.safe_load(write_system(found)), found.left_out
 
 
+def errors(system: dict[str, Any], folder: Path) -> list[str]:
+    """Return the messages about errors in a system."""
+    diagnostics = load_project(folder, {"s.yaml": yaml.safe_dump(system)}).diagnostics
+    return [item.message for item in diagnostics if item.severity is Severity.ERROR]
+
+
 def conditions(item: Mapping[str, Any]) -> dict[str, str]:
     return {key: item[key] for key in ("if", "unless") if key in item}
 
 
-def test_a_condition_is_kept() -> None:
-    system, _ = visited(
-        lambda values: [node("sim" if values["sim"] == "true" else "driver"), node("nav")],
-        argument("sim", "false"),
-    )
-    assert system["arguments"] == {"sim": False}
-    assert {name: conditions(item) for name, item in system["nodes"].items()} == {
+def test_conditions_are_kept_and_values_become_references() -> None:
+    def nodes(values: Values) -> Described:
+        rate = 5.0 if values["rate"] == "5.0" else values["rate"]
+        nav = node(
+            "nav",
+            parameters={"use_sim_time": values["sim"] == "true", "rate": rate},
+            remappings={"scan": f"/{values['robot']}/scan"},
+            namespace=f"/{values['robot']}",
+        )
+        return [node("sim" if values["sim"] == "true" else "driver"), nav]
+
+    arguments = (argument("sim", "false"), argument("rate", "5.0"), argument("robot", "r1"))
+    system, left_out = visited(nodes, *arguments)
+    assert left_out == ()
+    assert system["arguments"] == {"sim": False, "rate": 5.0, "robot": "r1"}
+    found = system["nodes"]
+    assert {name: conditions(item) for name, item in found.items()} == {
         "driver": {"unless": "sim"},
         "nav": {},
         "sim": {"if": "sim"},
     }
-
-
-def test_values_become_references() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        sim = values["sim"] == "true"
-        parameters = {
-            "use_sim_time": sim,
-            "rate": 5.0 if values["rate"] == "5.0" else values["rate"],
-        }
-        remappings = {"scan": f"/{values['robot']}/scan"}
-        return [
-            node(
-                "nav", parameters=parameters, remappings=remappings, namespace=f"/{values['robot']}"
-            )
-        ]
-
-    system, left_out = visited(
-        nodes, argument("sim", "false"), argument("rate", "5.0"), argument("robot", "r1")
-    )
-    assert left_out == ()
-    assert system["arguments"] == {"sim": False, "rate": 5.0, "robot": "r1"}
-    assert system["nodes"]["nav"] == {
+    assert found["nav"] == {
         "namespace": "/${robot}",
         "executable": {"package": "p", "name": "program"},
         "parameters": {
@@ -103,7 +99,7 @@ def test_values_become_references() -> None:
 
 
 def test_a_parameter_of_a_conditional_node_has_the_type_of_the_argument() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         rate = 5.0 if values["rate"] == "5.0" else values["rate"]
         parameters = {"use_sim_time": values["sim"] == "True", "rate": rate, "key": values["key"]}
         return [node("view", parameters=parameters)] if values["gui"] == "False" else [node()]
@@ -118,36 +114,17 @@ def test_a_parameter_of_a_conditional_node_has_the_type_of_the_argument() -> Non
     }
 
 
-def test_what_differs_in_another_way_has_a_condition_for_each() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        return [node("nav", arguments=["-x"] if values["fast"] == "True" else ["-y", "-z"])]
-
-    system, _ = visited(nodes, argument("fast", "False"))
-    first, second = system["nodes"].values()
-    assert (first["executable"]["arguments"], conditions(first)) == (
-        ["-y", "-z"],
-        {"unless": "fast"},
-    )
-    assert (second["executable"]["arguments"], conditions(second)) == (["-x"], {"if": "fast"})
-    assert {first.get("name", "nav"), second["name"]} == {"nav"}
-
-
 def test_components_are_in_the_container_that_is_there(tmp_path: Path) -> None:
-    component = {"package": "demo", "plugin": "demo::Camera"}
-
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         # A prefix is left out, so it does not make another container.
         prefix = {"left_out": ["prefix: gdb"] * (values["gdb"] == "true")}
         arguments = ["-x"] if values["fast"] == "true" else ["-y", "-z"]
         box = node("box", arguments=arguments, process=prefix)
-        camera = node("camera", component=component, container=("/", "box"))
+        camera = node("camera", component=COMPONENT, container=("/", "box"))
         return [camera] if values["own"] == "false" else [box, camera]
 
-    names = ("fast", "gdb", "own")
-    system, left_out = visited(nodes, *(argument(name, "true") for name in names))
-    file = tmp_path / "s.yaml"
-    file.write_text(yaml.safe_dump(system))
-    assert not [item for item in load(file).diagnostics if item.severity is Severity.ERROR]
+    system, left_out = visited(nodes, *switches("fast", "gdb", "own", default="true"))
+    assert errors(system, tmp_path) == []
     containers = {
         item["container"]: (name, conditions(item))
         for name, item in system["nodes"].items()
@@ -159,28 +136,26 @@ def test_components_are_in_the_container_that_is_there(tmp_path: Path) -> None:
         "box_3": ("camera_3", {"unless": "own"}),
     }
     assert conditions(system["nodes"]["box_3"]) == {"unless": "own"}
-    assert left_out == (
-        "argument gdb: no node depends on it",
-        "prefix: gdb (of /box)",
-    )
+    assert left_out == ("argument gdb: no node depends on it", "prefix: gdb (of /box)")
+
+
+THREE = ["true", "false", "auto"]
 
 
 @pytest.mark.parametrize(
     ("choices", "declared", "is_fast"),
     [
-        ((), False, "fast"),
-        (("true", "false"), False, "fast"),
-        (
-            ("true", "false", "auto"),
-            {"default": "false", "choices": ["true", "false", "auto"]},
-            "fast == 'true'",
-        ),
+        ([], False, "fast"),
+        (["true", "false"], False, "fast"),
+        (THREE, {"default": "false", "choices": THREE}, "fast == 'true'"),
     ],
 )
 def test_as_few_nodes_as_possible(
-    choices: tuple[str, ...], declared: object, is_fast: str, tmp_path: Path
+    choices: list[str], declared: object, is_fast: str, tmp_path: Path
 ) -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    """What differs in a way that no argument gives has a condition for each."""
+
+    def nodes(values: Values) -> Described:
         fast = values["fast"] == "true"
         parameters = {"use_sim_time": values["sim"] == "true", "fast": fast}
         arguments = ["-x"] if fast else ["-y", "-z"]
@@ -190,73 +165,64 @@ def test_as_few_nodes_as_possible(
     assert system["arguments"] == {"fast": declared, "sim": False}
     slow, fast = system["nodes"].values()
     assert (conditions(slow), conditions(fast)) == ({"unless": is_fast}, {"if": is_fast})
+    assert [item["executable"]["arguments"] for item in (slow, fast)] == [["-y", "-z"], ["-x"]]
+    assert {slow.get("name", "nav"), fast["name"]} == {"nav"}
     assert slow["parameters"]["use_sim_time"]["default"] == "${sim}"
-    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
-    [result] = load_files([tmp_path / "s.yaml"])
-    assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
+    assert errors(system, tmp_path) == []
+
+
+FIXED = "the system has its value, and cannot change it"
 
 
 def test_what_cannot_be_kept_is_listed() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         return [node(f"robot_{number}") for number in range(int(values["robots"]))]
 
     system, left_out = visited(nodes, argument("robots", "2"), argument("unused", "x"))
     assert sorted(system["nodes"]) == ["robot_0", "robot_1"]
-    assert left_out == (
-        "argument robots: the system has its value, and cannot change it",
-        "argument unused: no node depends on it",
-    )
+    assert left_out == (f"argument robots: {FIXED}", "argument unused: no node depends on it")
 
 
 def test_values_and_combinations_that_fail_are_left_out() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         if values["slam"] == "True":
             raise KeyError("package 'slam' not found")
         if values["sim"] == values["gui"] == "true":
             raise OSError
         return [node(values["robot"]), *[node(name) for name in ("sim", "gui") if values[name]]]
 
-    def arguments(robot: str) -> list[dict[str, Any]]:
-        switches = [argument(name, "false") for name in ("sim", "gui")]
-        return [argument("slam", "False"), *switches, argument("robot", robot, "r1", "r2", "r3")]
-
-    system, left_out = visited(nodes, *arguments("r1"))
+    robot = argument("robot", "r1", "r1", "r2", "r3")
+    system, left_out = visited(nodes, argument("slam", "False"), *switches("sim", "gui"), robot)
     assert set(system["arguments"]) == {"robot"}
     assert left_out == (
-        "argument slam: the system has its value, and cannot change it:"
-        " with 'True', KeyError: package 'slam' not found",
-        "argument gui: the system has its value, and cannot change it",
+        f"argument slam: {FIXED}: with 'True', KeyError: package 'slam' not found",
+        f"argument gui: {FIXED}",
         "argument sim: no node depends on it",
     )
 
 
 @pytest.mark.parametrize("robot", ["r1", ""])
 def test_parameters_of_inner_nodes_do_not_depend_on_arguments(robot: str) -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         inner = {"sim": values["sim"] == "true", "frame": f"{robot and values['robot']}/odom"}
         sections = {"/costmap": inner} | ({"/map": {}} if values["map"] == "true" else {})
         return [node(f"base_{values['fast']}_{values['robot']}", sections=sections)]
 
-    names = ("sim", "fast", "map")
-    system, left_out = visited(
-        nodes, argument("robot", "r1"), *[argument(name, "false") for name in names]
-    )
-    kept = {"fast"} if robot else {"fast", "robot"}
-    assert set(system["arguments"]) == kept
-    fixed = "argument {}: the system has its value, and cannot change it: {}"
+    system, left_out = visited(nodes, argument("robot", "r1"), *switches("sim", "fast", "map"))
+    assert set(system["arguments"]) == ({"fast"} if robot else {"fast", "robot"})
     expected = [
-        fixed.format("sim", "with 'true', /costmap inside a program has other parameters"),
+        f"argument sim: {FIXED}: with 'true', /costmap inside a program has other parameters",
         "argument map: no node depends on it",
-        "parameters of /costmap: with --output, a file has them",
     ]
     if robot:
         dependent = "nodes inside a program have parameters that depend on it"
-        expected.insert(0, fixed.format("robot", dependent))
-    assert [text for text in left_out if text in expected] == expected[:-1]
+        expected.insert(0, f"argument robot: {FIXED}: {dependent}")
+    assert [text for text in left_out if text in expected] == expected
+    assert "parameters of /costmap: with --output, a file has them" not in left_out
 
 
 def test_parameters_of_inner_nodes_have_the_values_of_the_defaults() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         inner = {"enabled": values["slam"] == "true", "rate": 5.0}
         slam = [node("slam")] if values["slam"] == "true" else []
         return [node("nav", sections={"/costmap": inner}), *slam]
@@ -267,9 +233,9 @@ def test_parameters_of_inner_nodes_have_the_values_of_the_defaults() -> None:
 
 
 def test_constants_that_are_compared_and_choices_are_tried(tmp_path: Path) -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        burger = [node("small")] if values["model.name"] == "burger" else [node("large")]
-        return [*burger, node(values["lidar"]), node("nav")]
+    def nodes(values: Values) -> Described:
+        size = "small" if values["model.name"] == "burger" else "large"
+        return [node(size), node(values["lidar"]), node("nav")]
 
     arguments = (argument("model.name", "waffle"), argument("lidar", "sick", "sick", "ouster"))
     system, left_out = visited(nodes, *arguments, **{"model.name": ["burger"]})
@@ -278,20 +244,18 @@ def test_constants_that_are_compared_and_choices_are_tried(tmp_path: Path) -> No
         "model_name": "waffle",
         "lidar": {"default": "sick", "choices": ["sick", "ouster"]},
     }
-    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
-
-    def started(*given: str) -> set[str]:
-        result = load(tmp_path / "s.yaml", overrides=OverrideOptions(arguments=given))
-        assert result.system is not None
-        return {item.name.value for item in result.system.nodes}
-
-    assert started() == {"large", "sick", "nav"}
-    assert started("model_name=burger", "lidar=ouster") == {"small", "ouster", "nav"}
-    assert started("model_name=other") == {"large", "sick", "nav"}
+    for given, names in (
+        ((), {"large", "sick", "nav"}),
+        (("model_name=burger", "lidar=ouster"), {"small", "ouster", "nav"}),
+        (("model_name=other",), {"large", "sick", "nav"}),
+    ):
+        files = {"s.yaml": yaml.safe_dump(system)}
+        result = load_project(tmp_path, files, overrides=OverrideOptions(arguments=given))
+        assert {item.name.value for item in result.system.nodes} == names
 
 
 def test_any_other_value_differs_from_the_constants() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         parameters = {"yaml_filename": values["map"]} if values["map"] else {}
         return [node("map_server", parameters=parameters)]
 
@@ -304,46 +268,40 @@ def test_any_other_value_differs_from_the_constants() -> None:
 
 
 def test_equal_descriptions_have_one_condition() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        parameters = {"use_sim_time": values["sim"] == "true", "rate": 5}
-        arguments = ["-d"] if values["localization"] == "true" else []
-        is_third = values["localization"] == values["third"] == "true"
-        third = [node("third", parameters={"sim": values["sim"] == "true"})] if is_third else []
-        return [node("slam", parameters=parameters, arguments=arguments), *third]
+    def nodes(values: Values) -> Described:
+        sim, is_local = values["sim"] == "true", values["localization"] == "true"
+        arguments = ["-d"] if is_local else []
+        slam = node("slam", parameters={"use_sim_time": sim, "rate": 5}, arguments=arguments)
+        is_third = is_local and values["third"] == "true"
+        return [slam, node("third", parameters={"sim": sim})] if is_third else [slam]
 
-    bools = [argument(name, "false") for name in ("localization", "third")]
-    system, _ = visited(nodes, argument("sim", "false", "true", "false"), *bools)
+    sim = argument("sim", "false", "true", "false")
+    system, _ = visited(nodes, sim, *switches("localization", "third"))
     assert system["arguments"] == {"sim": False, "localization": False, "third": False}
     assert [conditions(item) for item in system["nodes"].values()] == [
         {"unless": "localization"},
         {"if": "localization"},
         {"if": "localization and third"},
     ]
-    types = {
-        item["parameters"][key]["type"]
-        for item in system["nodes"].values()
-        for key in item["parameters"]
-        if "sim" in key
-    }
-    assert types == {"bool"}
+    for item in system["nodes"].values():
+        types = {it["type"] for key, it in item["parameters"].items() if "sim" in key}
+        assert types == {"bool"}
 
 
 def test_arguments_without_a_value_need_one() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         return [node("driver", parameters={"ip": values["ip"], "type": values["type"]})]
 
     system, _ = visited(nodes, argument("type", None, "ur3", "ur5"), argument("ip", None))
     assert system["arguments"] == {"type": {"choices": ["ur3", "ur5"]}, "ip": {"type": "string"}}
-    values = {
-        name: item["default"] for name, item in system["nodes"]["driver"]["parameters"].items()
-    }
+    parameters = system["nodes"]["driver"]["parameters"]
+    values = {name: item["default"] for name, item in parameters.items()}
     assert values == {"ip": "${ip}", "type": "${type}"}
 
 
 def test_a_container_that_something_else_starts_has_the_condition_of_its_components() -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        component = {"package": "p", "plugin": "p::P"}
-        changes = {"component": component, "container": ("/", "box")}
+    def nodes(values: Values) -> Described:
+        changes = {"component": COMPONENT, "container": ("/", "box")}
         return [node("map", **changes if values["composed"] == "True" else {})]
 
     system, _ = visited(nodes, argument("composed", "False"))
@@ -354,11 +312,10 @@ def test_a_container_that_something_else_starts_has_the_condition_of_its_compone
 def test_a_program_has_the_parameters_of_a_name_that_other_arguments_give(composed: str) -> None:
     """nav2's controller is a component with a name, or a program that names itself."""
 
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
-        component = {"package": "p", "plugin": "p::P"}
+    def nodes(values: Values) -> Described:
         if values["composed"] == "True":
-            container = ("/", "box")
-            return [node("a", component=component, container=container, parameters={"rate": 2})]
+            changes = {"component": COMPONENT, "container": ("/", "box")}
+            return [node("a", **changes, parameters={"rate": 2})]
         return [node(None, executable="a", sections={"/a": {"rate": 2}})]
 
     found = described(nodes, argument("composed", composed))

@@ -17,52 +17,58 @@ from hypothesis import strategies as st
 
 from composer.language.tree import plain
 from composer.launch.conditions import condition
-from composer.loading import load, load_files
+from composer.loading import load
 from composer.model.resolve import OverrideOptions
 from tests.examples import examples
-from tests.unit.bridges.importing.test_launch_arguments import argument, conditions, visited
+from tests.unit.bridges.importing.test_launch_arguments import (
+    Described,
+    Values,
+    argument,
+    conditions,
+    errors,
+    switches,
+    visited,
+)
 from tests.unit.bridges.importing.test_launch_file import node
+from tests.unit.support.checking import load_project
 
 A, B = ({"a": a, "b": b} for a, b in (("false", "x"), ("false", "y")))
 C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
 
 
 @pytest.mark.parametrize(
-    ("present", "expected"),
+    ("visits", "present", "expected"),
     [
-        ([0, 1, 2, 3], {}),
-        ([0, 1], {"unless": "a"}),
-        ([2, 3], {"if": "a"}),
-        ([0, 2], {"unless": "b == 'y'"}),
-        ([1, 3], {"if": "b == 'y'"}),
-        ([1], {"if": "not a and b == 'y'"}),
-        ([0, 1, 2], {"unless": "a and b == 'y'"}),
-        ([0, 3], {"unless": "not a and b == 'y' or a and b == 'x'"}),
+        ([A, B, C, D], [0, 1, 2, 3], {}),
+        ([A, B, C, D], [0, 1], {"unless": "a"}),
+        ([A, B, C, D], [2, 3], {"if": "a"}),
+        ([A, B, C, D], [0, 2], {"unless": "b == 'y'"}),
+        ([A, B, C, D], [1, 3], {"if": "b == 'y'"}),
+        ([A, B, C, D], [1], {"if": "not a and b == 'y'"}),
+        ([A, B, C, D], [0, 1, 2], {"unless": "a and b == 'y'"}),
+        ([A, B, C, D], [0, 3], {"unless": "not a and b == 'y' or a and b == 'x'"}),
+        # No double negation.
+        ([{"viewer": "true"}, {"viewer": "false"}], [0], {"if": "viewer"}),
+        ([{"viewer": "true"}, {"viewer": "false"}], [1], {"unless": "viewer"}),
     ],
 )
-def test_the_condition_is_short(present: list[int], expected: dict[str, str]) -> None:
-    assert condition([A, B, C, D], present) == expected
+def test_the_condition_is_short(
+    visits: list[dict[str, str]], present: list[int], expected: dict[str, str]
+) -> None:
+    assert condition(visits, present) == expected
 
 
 def test_a_condition_that_would_be_too_long_is_divided(tmp_path: Path) -> None:
-    def nodes(values: Mapping[str, str]) -> list[dict[str, Any]]:
+    def nodes(values: Values) -> Described:
         is_odd = [*values.values()].count("true") % 2 == 1
         return [node("odd"), node("nav")] if is_odd else [node("nav")]
 
     names = "abcdef"
-    system, _ = visited(nodes, *[argument(name, "false") for name in names])
-    (tmp_path / "s.yaml").write_text(yaml.safe_dump(system))
+    system, _ = visited(nodes, *switches(*names))
     for number, expected in ((0, 1), (1, 2), (2, 1), (5, 2)):
-        arguments = tuple(f"{name}=true" for name in names[:number])
-        result = load(tmp_path / "s.yaml", overrides=OverrideOptions(arguments=arguments))
-        assert result.system is not None
-        assert len(result.system.nodes) == expected
-
-
-def test_a_condition_has_no_double_negation() -> None:
-    visits = [{"viewer": "true"}, {"viewer": "false"}]
-    assert condition(visits, [0]) == {"if": "viewer"}
-    assert condition(visits, [1]) == {"unless": "viewer"}
+        overrides = OverrideOptions(arguments=tuple(f"{name}=true" for name in names[:number]))
+        files = {"s.yaml": yaml.safe_dump(system)}
+        assert len(load_project(tmp_path, files, overrides=overrides).system.nodes) == expected
 
 
 VALUES = {"a": ["true", "false"], "b": ["True", "False"], "c": ["x", "y", "z"], "d": ["one", "any"]}
@@ -189,5 +195,4 @@ def test_a_launch_file_keeps_its_arguments(tmp_path: Path) -> None:
     }
     values = {name: item["default"] for name, item in system["nodes"]["map"]["parameters"].items()}
     assert values == {"use_sim_time": "${sim}", "yaml": "${map}", "ip": "${ip}"}
-    [result] = load_files([tmp_path / "robot.yaml"])
-    assert [item.message for item in result.diagnostics if item.severity.value == "error"] == []
+    assert errors(system, tmp_path) == []
