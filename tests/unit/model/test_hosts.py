@@ -127,10 +127,7 @@ def test_a_discovery_is_expressed_by_variables_of_ros(
     ("problem", "addresses"),
     [
         (None, ("10.0.0.1", "10.0.0.1:11811", "jetson-1.local:65535", "robot_1")),
-        (
-            "has no valid port",
-            ("10.0.0.1:", "10.0.0.1:0", "10.0.0.1:65536", "10.0.0.1:\u0661"),
-        ),
+        ("has no valid port", ("10.0.0.1:", "10.0.0.1:0", "10.0.0.1:65536", "10.0.0.1:\u0661")),
         ("is not an IPv4 address", ("10.0.0:11811", "10.0..1", "10.0.0.256")),
         ("is not the address of a computer", ("0.0.0.0", "239.255.0.1")),
         ("is an IPv6 address", ("::1", "[::1]:11811")),

@@ -42,7 +42,6 @@ def test_rules_can_be_looked_up_by_code_and_name() -> None:
 
 def test_an_explanation_is_complete() -> None:
     rule = find_rule("RC202", all_rules())
-    assert rule is not None
     text = explain(rule)
     for part in (rule.code, rule.name, page_of(rule).summary, "depends_on: [planer]"):
         assert part in text

@@ -180,7 +180,7 @@ def test_the_commands_of_the_guide_work(project: Path) -> None:
         done = compose(*words)
         assert done.code == 0, done.err
     assert sorted(str(path.relative_to(project)) for path in project.rglob("*.xml")) == [
-        "policies/robot.xml",
+        "policies/robot.xml"
     ]
 
 

@@ -58,11 +58,7 @@ def restarted(backoff_ms: int, **restart: int) -> dict[str, Any]:
             restarted(2000, max_attempts=3),
             (),
         ),
-        (
-            {"process": {"respawn_delay": 0.0, "respawn_max_retries": -1}},
-            restarted(0),
-            (LIMITED,),
-        ),
+        ({"process": {"respawn_delay": 0.0, "respawn_max_retries": -1}}, restarted(0), (LIMITED,)),
         ({"process": {"ends_launch": True}}, {"lifecycle": {"on_failure": "shutdown"}}, ()),
         ({"process": {"cwd": "/tmp"}}, {"executable": {"working_directory": "/tmp"}}, ()),
         (
@@ -130,7 +126,6 @@ def test_what_is_written_is_valid_and_has_the_parameters_of_inner_nodes(tmp_path
             "ros__parameters": {"use_sim_time": True, "radius": 0.22, "text": "a", "speed": 2}
         },
     }
-    assert result.system is not None
     base, program = result.system.nodes
     values = {item.name.value: item.value.value for item in base.parameters if item.value}
     assert values == {

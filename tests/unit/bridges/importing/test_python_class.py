@@ -213,7 +213,6 @@ def test_what_is_open_is_listed_and_the_file_is_valid(tmp_path: Path) -> None:
     path.write_text(write_node_type("guard", node))
     result = load(path)
     assert [item for item in result.diagnostics if item.severity is Severity.ERROR] == []
-    assert result.system is not None
     (guard,) = result.system.nodes
     words = {port.name.value: port.kind for port in guard.ports if port.full_name == "/words"}
     assert words == {"words": PortKind.PUBLISHER, "words_2": PortKind.SUBSCRIPTION}

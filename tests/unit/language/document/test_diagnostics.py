@@ -68,16 +68,8 @@ def located(diagnostic: Diagnostic) -> str:
         ("a: %x", "f:1:4 a value cannot start with '%'", "whole text in quotes"),
         ("a: ]", "f:1:4 expected a value, found ']'", "whole text in quotes"),
         ("a: {b: 1,, c: 2}", "f:1:10 expected a value, found ','", "whole text in quotes"),
-        (
-            'a: "\\q"',
-            "f:1:5 this backslash does not start a YAML escape",
-            "single quotes",
-        ),
-        (
-            'a: "xy\\x9"',
-            "f:1:7 this backslash does not start a YAML escape",
-            "single",
-        ),
+        ('a: "\\q"', "f:1:5 this backslash does not start a YAML escape", "single quotes"),
+        ('a: "xy\\x9"', "f:1:7 this backslash does not start a YAML escape", "single"),
         ("a: |x\n b", "f:1:5 unexpected text after '|' or '>'", "end of the line"),
         ("'a':1", "f:1:4 the YAML ends before this", "space after the colon"),
         ("a: 1\n...\nfoo", "f:3:1 the YAML ends before this", "one map"),

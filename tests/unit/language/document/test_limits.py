@@ -43,10 +43,7 @@ ATTACKS = {
         "small maps": "- {a: 1}\n" * (FULL // 9),
         "many keys": "".join(f"k{number}: 1\n" for number in range(MAX_VALUES // 2)),
     },
-    "unsupported-yaml": {
-        "alias of itself": "a: &a [*a]",
-        "a long tag": "a: !" + "x" * (FULL - 4),
-    },
+    "unsupported-yaml": {"alias of itself": "a: &a [*a]", "a long tag": "a: !" + "x" * (FULL - 4)},
     "duplicate-key": {"one key again and again": "a: 1\n" * MAX_ERRORS},
     "yaml-syntax": {
         "blanks": " " * FULL,

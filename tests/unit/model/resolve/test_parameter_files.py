@@ -49,8 +49,7 @@ OTHERS += ("/" + "**/*/" * 100 + "x",)  # takes no time
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"),
-    [*((name, 7.0) for name in PLANNER), *((name, 1.0) for name in OTHERS)],
+    ("name", "expected"), [*((name, 7.0) for name in PLANNER), *((name, 1.0) for name in OTHERS)]
 )
 def test_names_may_have_wildcards(name: str, expected: float, tmp_path: Path) -> None:
     assert value("speed", tmp_path, section(f'"{name}"', 7.0)) == expected

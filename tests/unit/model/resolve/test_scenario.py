@@ -82,7 +82,6 @@ def test_steps_and_expectations(folder: Path) -> None:
     )
     assert reported(result) == []
     found = result.scenario
-    assert found is not None
     assert (found.seed, found.for_s.value, len(found.conditions)) == (3, 5, 4)
     first, second = found.steps
     assert [(item.verb, item.name.value) for item in first.actions] == [
@@ -90,10 +89,8 @@ def test_steps_and_expectations(folder: Path) -> None:
         (Verb.DROP, "/bot/scan"),
     ]
     assert first.actions[1].options["for_s"].value == 1.5
-    assert second.when is not None
     assert (second.when.kind, second.when.name.value) == (EventKind.MESSAGE, "/bot/scan")
     [silence] = second.expectations
-    assert silence.until_s is not None
     assert (silence.kind, silence.until_s.value) == (ExpectationKind.SILENCE, 3)
 
 

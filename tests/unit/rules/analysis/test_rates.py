@@ -30,12 +30,7 @@ BEHAVIOR = """\
     timers: {fast: {rate_hz: 50}, slow: {rate_hz: 1}}
     services: {reset: {type: std_srvs/srv/Trigger}}
 """
-HANDLERS = {
-    "on_fast": "pass",
-    "on_slow": "pass",
-    "on_reset": "return response",
-    "helper": "pass",
-}
+HANDLERS = {"on_fast": "pass", "on_slow": "pass", "on_reset": "return response", "helper": "pass"}
 
 
 def topic_hz(name: str, text: str, folder: Path, python: str = "") -> float | None:
