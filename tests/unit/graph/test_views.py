@@ -18,45 +18,26 @@ def drawn(text: str, view: View = View.NODES) -> Graph:
     return build_graph(scene_of([system_of(text)]), view)
 
 
-def arrows(graph: Graph) -> dict[tuple[str, str], tuple[str, ...]]:
-    return {(edge.source, edge.target): edge.lines for edge in graph.edges}
-
-
-TALK = """
-    system: talk
-    nodes:
-      talker:
-        namespace: left
-        parameters: {rate_hz: 4.0}
-        publishers: {chatter: {type: std_msgs/msg/String, topic: /chatter, qos: sensor_data}}
-        timers: {tick: {rate_hz: "{parameters.rate_hz}", publish: {chatter: {data: hello}}}}
-      listener:
-        namespace: right
-        subscriptions: {chatter: {type: std_msgs/msg/String, topic: /chatter, qos: sensor_data}}
-      asker:
-        namespace: right
-        clients: {ask: {type: std_srvs/srv/Trigger, service: /ask}}
-      answerer:
-        services: {ask: {type: std_srvs/srv/Trigger, service: /ask}}
-"""
-
-
 def test_namespaces_are_frames_and_one_that_holds_one_other_is_none() -> None:
-    text = """
-        system: nested
-        nodes:
-          one: {namespace: a/b/c}
-          two: {namespace: a/b/d}
-          three: {namespace: x/y/z}
-    """
-    clusters = {cluster.key: cluster.parent for cluster in drawn(text).clusters}
-    assert clusters == {"/a/b": "", "/a/b/c": "/a/b", "/a/b/d": "/a/b", "/x/y/z": ""}
+    nodes = "{one: {namespace: a/b/c}, two: {namespace: a/b/d}, three: {namespace: x/y/z}}"
+    clusters = drawn(f"system: nested\nnodes: {nodes}\n").clusters
+    assert {cluster.key: cluster.parent for cluster in clusters} == {
+        "/a/b": "",
+        "/a/b/c": "/a/b",
+        "/a/b/d": "/a/b",
+        "/x/y/z": "",
+    }
 
 
 def test_a_timer_with_a_condition_promises_no_rate() -> None:
-    text = TALK.replace("publish: {chatter", "when: count > 3, publish: {chatter")
-    lines = arrows(drawn(text))
-    assert lines["node:/left/talker", "topic:/chatter"] == ("sensor_data",)
+    edges = drawn("""
+        system: talk
+        nodes:
+          talker:
+            publishers: {chatter: {type: std_msgs/msg/String, qos: sensor_data}}
+            timers: {tick: {rate_hz: 4, when: count > 3, publish: {chatter: {data: hello}}}}
+    """).edges
+    assert [edge.lines for edge in edges] == [("sensor_data",)]
 
 
 def test_the_deployment_view_draws_components_in_their_containers() -> None:
@@ -109,15 +90,12 @@ def test_the_position_of_a_diagnostic_is_marked() -> None:
           lost: {lifecycle: {depends_on: [missing]}}
     """
     loading = load_bytes(dedent(text).encode(), Path("/nowhere"), shown="broken.yaml")
-    assert loading.system is not None
     graph = build_graph(scene_of([loading.system], loading.diagnostics))
     marked = {item.key: item.problem.mark for item in graph.vertices if item.problem}
     assert marked == {"node:/lost": Mark.WRONG}
     found = {edge.target: edge.problem for edge in graph.edges if edge.problem}
-    assert {target: problem.mark for target, problem in found.items()} == {
-        "topic:/talk": Mark.WRONG,
-        "node:/strict": Mark.WRONG,
-    }
+    marks = {target: problem.mark for target, problem in found.items()}
+    assert marks == dict.fromkeys(("topic:/talk", "node:/strict"), Mark.WRONG)
     assert "reliab" in found["node:/strict"].text
 
 

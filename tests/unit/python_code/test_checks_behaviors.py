@@ -19,7 +19,6 @@ FILES = [
     class Robot:
         def __init__(self):
             self.reset()
-
         def reset(self):
             self.start_s = self.clock.now()  # EARLY
     """,
@@ -40,7 +39,6 @@ FILES = [
     class Robot:
         def clock(self):
             return 0.0
-
         def __init__(self):
             self.start_s = self.clock()
     """,
@@ -55,26 +53,20 @@ FILES = [
             await self.action_clients.count.send_goal(None)  # EARLY
             await self.clock.sleep(1.0)
             self.later = lambda: self.publishers.velocity.publish(None)
-
         def on_cleanup(self):
             self.stop()
-
         def stop(self):
             self.publishers.velocity.publish(None)  # EARLY?
-
         def on_activate(self):
             self.publishers.velocity.publish(None)
-
         def on_deactivate(self):
             self.publishers.velocity.publish(None)
     """,
     """
     class Robot:
         is_active = False
-
         def on_configure(self):
             self.update()
-
         def update(self):
             if self.is_active:
                 self.publishers.velocity.publish(None)
@@ -97,7 +89,6 @@ FILES = [
     class Robot:
         def on_activate(self):
             threading.Thread(target=lambda: asyncio.run(self.serve())).start()
-
         async def serve(self):
             await asyncio.sleep(0.5)
     """,
@@ -107,7 +98,6 @@ FILES = [
             goal = await self.action_clients.count.send_goal(None, on_feedback=self.show)
             await self.action_clients.count.send_goal(None, on_feedback=lambda: 1)
             await self.action_clients.count.send_goal(None, on_feedback=lambda feedback: 1)
-
         def show(self, name, feedback):
             pass
     """,
@@ -115,11 +105,9 @@ FILES = [
     class Robot:
         def other(this, value):
             return value
-
         @staticmethod
         def plain():
             return 1
-
         async def on_fibonacci(self, goal):
             return None
     """,

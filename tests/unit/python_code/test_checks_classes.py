@@ -93,11 +93,6 @@ PARAMETERS = [
 ]
 
 
-@pytest.mark.parametrize("body", PARAMETERS)
-def test_parameters(body: str, tmp_path: Path) -> None:
-    check(node(textwrap.dedent(body)), tmp_path, "class")
-
-
 FILES = [
     """
     class Robot(Node):
@@ -117,7 +112,6 @@ FILES = [
     class Robot(Node):
         def __init__(self):
             self.start()
-
         def start(self):
             super().__init__('robot')
     """,
@@ -151,7 +145,6 @@ FILES = [
     class Robot(Node):
         def get_parameter(self, name):
             return super().get_parameter(name).value
-
         def on_tick(self):
             return self.get_parameter('rate') > 3
     """,
@@ -160,13 +153,10 @@ FILES = [
         def on_configure(self, state):
             self.publisher = self.create_lifecycle_publisher(String, 'a', 10)
             return TransitionCallbackReturn.SUCCESS
-
         def on_activate(self, state):
             return TransitionCallbackReturn.SUCCESS  # CONSTRUCTOR?
-
         def on_deactivate(self, state):
             return super().on_deactivate(state)
-
         def on_cleanup(self, state):
             self.publisher = None
     """,
@@ -175,14 +165,11 @@ FILES = [
         def on_configure(self, state):
             self.publisher = self.create_lifecycle_publisher(String, 'a', 10)
             return TransitionCallbackReturn.SUCCESS
-
         def on_activate(self, state):
             self.publisher.on_activate(state)
             return TransitionCallbackReturn.SUCCESS
-
         def on_cleanup(self, state):
             return self.clean()
-
         def on_error(self, state):
             raise RuntimeError
     """,
@@ -195,10 +182,8 @@ FILES = [
     class Robot(Node):
         def build():
             return 1
-
         def names(kind):
             return [kind]
-
         NAMES = names('a')
 
     Robot.build()
@@ -207,7 +192,6 @@ FILES = [
     class Robot(Node):
         def create_timer(self, callback, seconds):
             return super().create_timer(seconds, callback)
-
         def on_tick(self):
             self.create_timer(lambda: None, lambda event: None)
     """,
@@ -216,13 +200,18 @@ FILES = [
         def __init__(self):
             super().__init__('robot')
             self.create_subscription(UInt8, 'a', self.on_a, 10)
-
         def on_a(self, message):
             message.data = 300  # VALUE
     """,
 ]
 
 
-@pytest.mark.parametrize("text", FILES)
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(node(textwrap.dedent(body)) for body in PARAMETERS),
+        *(IMPORTS + textwrap.dedent(text) for text in FILES),
+    ],
+)
 def test_classes(text: str, tmp_path: Path) -> None:
-    check(IMPORTS + textwrap.dedent(text), tmp_path, "class")
+    check(text, tmp_path, "class")

@@ -90,11 +90,6 @@ def behavior(body: str) -> str:
     return IMPORTS + head + textwrap.indent(body, "        ") + "\n"
 
 
-@pytest.mark.parametrize("body", [*WRONG, *RIGHT])
-def test_values(body: str, tmp_path: Path) -> None:
-    check(behavior(body), tmp_path, "behavior")
-
-
 FILES = [
     # Arguments with annotations.
     """
@@ -103,7 +98,6 @@ FILES = [
     class Robot:
         def on_tick(self):
             self.show(BatteryState())
-
         def show(self, battery: BatteryState):
             battery.power_supply_status = 9  # VALUE?
 
@@ -121,7 +115,6 @@ FILES = [
 
     class Robot:
         FULL = UInt8(data=-1)  # VALUE
-
         def on_tick(self):
             UInt8 = dict
             return UInt8(data=300)
@@ -139,8 +132,8 @@ FILES = [
 ]
 
 
-@pytest.mark.parametrize("text", FILES)
-def test_values_in_files(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("text", [*map(behavior, WRONG + RIGHT), *FILES])
+def test_values(text: str, tmp_path: Path) -> None:
     check(text, tmp_path, "behavior")
 
 

@@ -13,7 +13,7 @@ from composer.base.diagnostics import Severity
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_parameters, write_system
 from composer.launch.parameter_values import parameter_values
-from composer.loading import load
+from tests.unit.support.checking import load_project
 
 PARAMETERS = """\
 /**: {ros__parameters: {use_sim_time: true}}
@@ -87,8 +87,8 @@ def test_nodes_without_a_name_and_with_that_of_another_have_a_free_one() -> None
     nodes, left_out = described(
         node("program"), node(None), node(None, executable="2 wheels.py"), node("program")
     )
-    assert list(nodes) == ["program", "program_2", "_2_wheels", "program_3"]
-    assert [item["executable"].get("nodes") for item in nodes.values()] == [None, [], [], None]
+    names = {name: item["executable"].get("nodes") for name, item in nodes.items()}
+    assert names == {"program": None, "program_2": [], "_2_wheels": [], "program_3": None}
     assert left_out == ("the name 'program' of a second node: it is 'program_3' here",)
 
 
@@ -116,19 +116,18 @@ def test_what_is_written_is_valid_and_has_the_parameters_of_inner_nodes(tmp_path
         node(None, **parameter_values(sources, "/<node_name_unspecified>")),
     ]
     found = describe_launch_file("s", "f.launch.py", (), report(*items))
-    (tmp_path / "s.yaml").write_text(write_system(found, "s_parameters.yaml"))
-    (tmp_path / "s_parameters.yaml").write_text(write_parameters(found))
-    result = load(tmp_path / "s.yaml")
+    parameters = write_parameters(found)
+    files = {"s.yaml": write_system(found, "s_parameters.yaml"), "s_parameters.yaml": parameters}
+    result = load_project(tmp_path, files)
     assert [item for item in result.diagnostics if item.severity is not Severity.INFO] == []
-    assert yaml.safe_load(write_parameters(found)) == {
+    assert yaml.safe_load(parameters) == {
         "/**/driver": {"ros__parameters": {"use_sim_time": True, "opencr.id": 200, "speed": 2}},
         "/local_costmap/local_costmap": {
             "ros__parameters": {"use_sim_time": True, "radius": 0.22, "text": "a", "speed": 2}
         },
     }
     base, program = result.system.nodes
-    values = {item.name.value: item.value.value for item in base.parameters if item.value}
-    assert values == {
+    assert {item.name.value: item.value.value for item in base.parameters if item.value} == {
         "use_sim_time": True,
         "rate": 5.0,
         "qos_overrides./odom.publisher.depth": 3,

@@ -10,8 +10,8 @@ import pytest
 from composer.base.diagnostics import Severity
 from composer.bridges.importing.python_class import ClassNotFound, describe_class
 from composer.bridges.importing.writing import write_node_type
-from composer.loading import load
 from composer.model import PortKind
+from tests.unit.support.checking import load_project, write_files
 
 DRIVER = """\
 import sys
@@ -124,26 +124,23 @@ clients:
         ("drver:Lidar", "no Python module named 'drver'", "did you mean 'driver'?"),
         ("zzz.zzz:Lidar", "no Python module named 'zzz.zzz'", "this folder"),
         ("driver", "'driver' does not name a class", "demo_nodes_py"),
-        ("broken:A", "module 'broken' is not Python", None),
+        ("broken:A", "module 'broken' is not Python", ""),
         ("plain:A", "class 'A' is not derived from rclpy's Node", "compose new node"),
     ],
 )
 def test_what_is_not_a_class_is_explained(
-    text: str, message: str, hint: str | None, tmp_path: Path
+    text: str, message: str, hint: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "driver.py").write_text(DRIVER, encoding="utf-8")
-    (tmp_path / "broken.py").write_text("class A(\n", encoding="utf-8")
-    (tmp_path / "plain.py").write_text("class A:\n    pass\n", encoding="utf-8")
+    broken, plain = "class A(\n", "class A:\n    pass\n"
+    write_files(tmp_path, {"driver.py": DRIVER, "broken.py": broken, "plain.py": plain})
     with pytest.raises(ClassNotFound, match=message) as raised:
         describe_class(text, tmp_path)
-    assert hint is None or hint in str(raised.value.hint)
+    assert hint in str(raised.value.hint)
 
 
 def test_a_source_folder_with_the_name_of_rclpy_is_read(tmp_path: Path) -> None:
-    folder = tmp_path / "rclpy"
-    folder.mkdir()
-    (folder / "driver.py").write_text(DRIVER, encoding="utf-8")
-    node, _ = describe_class("driver:Lidar", folder)
+    write_files(tmp_path / "rclpy", {"driver.py": DRIVER})
+    node, _ = describe_class("driver:Lidar", tmp_path / "rclpy")
     assert node.ports
 
 
@@ -209,9 +206,7 @@ def test_what_is_open_is_listed_and_the_file_is_valid(tmp_path: Path) -> None:
         "guard.py:7: the value of argument area of the constructor: 'arguments' sets it",
         "guard.py:7: the value of argument alarm of the constructor: 'arguments' sets it",
     )
-    path = tmp_path / "guard.yaml"
-    path.write_text(write_node_type("guard", node))
-    result = load(path)
+    result = load_project(tmp_path, {"guard.yaml": write_node_type("guard", node)})
     assert [item for item in result.diagnostics if item.severity is Severity.ERROR] == []
     (guard,) = result.system.nodes
     words = {port.name.value: port.kind for port in guard.ports if port.full_name == "/words"}
