@@ -62,7 +62,7 @@ def test_every_check_has_a_report() -> None:
     modules = [module for name, module in sys.modules.items() if name.startswith("composer.rules.")]
     rules = [item for module in modules for item in vars(module).values() if isinstance(item, Rule)]
     # RC214 needs a folder outside of a project: tests/unit/rules/test_examples.py. RC307 needs an
-    # installed package: tests/unit/rules/test_outdated_interface.py. RC437 needs another Python.
+    # installed package: tests/unit/rules/test_projects.py. RC437 needs another Python.
     assert all_checks()
     assert {rule.code for rule in rules} - reported == {"RC214", "RC307", "RC437"}
 

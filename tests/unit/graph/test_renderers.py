@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from composer.base.characters import is_safe
 from composer.base.resources import systems_folder
+from composer.graph import output
 from composer.graph.diagram import (
     Cluster,
     Direction,
@@ -24,9 +27,10 @@ from composer.graph.diagram import (
 )
 from composer.graph.formats import mermaid, svg
 from composer.graph.layout import arrange
-from composer.graph.output import Format, render
+from composer.graph.output import Format, PngMissing, render
 from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
+from tests.unit.support.fleets import fleet_graph
 
 EVIL = 'end "quoted" <b>&amp; #35; `code` \\n |pipe| [x] {y} --> z;'
 SVG = "{http://www.w3.org/2000/svg}"
@@ -96,3 +100,39 @@ def test_every_example_system_is_drawn_in_every_format(path: Path) -> None:
         text = render([graph], Format.MERMAID).decode()
         frames = re.findall(r"^ *subgraph ", text, re.MULTILINE)
         assert len(frames) == len(re.findall(r"^ *end$", text, re.MULTILINE))
+
+
+def size(data: bytes) -> tuple[int, int]:
+    """Return width and height (PNG specification, 11.2.2)."""
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    width, height = struct.unpack(">II", data[16:24])
+    return width, height
+
+
+def drawn(graph: Graph) -> bytes:
+    return render([graph], Format.PNG)
+
+
+def test_resvg_draws_it_twice_as_large_as_it_is_laid_out() -> None:
+    pytest.importorskip("resvg_py")
+    graph = fleet_graph(3, View.NODES)
+    width, height = size(drawn(graph))
+    layout = arrange(graph)
+    assert width == pytest.approx(2 * layout.size.width, abs=2)
+    assert height > 2 * layout.size.height  # the title is above
+    # Text is drawn without the fonts of the SVG.
+    assert drawn(replace(graph, title="abcd")) != drawn(replace(graph, title="dcba"))
+
+
+def test_a_large_picture_does_not_take_all_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("resvg_py")
+    assert output.MAX_PIXELS <= 40_000_000
+    monkeypatch.setattr(output, "MAX_PIXELS", 400_000)  # quick to draw
+    width, height = size(drawn(fleet_graph(100, View.DEPLOYMENT)))
+    assert 350_000 < width * height < 450_000
+
+
+def test_a_missing_renderer_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output, "find_spec", lambda name: None)
+    with pytest.raises(PngMissing, match="needs resvg, which is not installed"):
+        drawn(fleet_graph(3, View.NODES))
