@@ -201,19 +201,15 @@ def test_a_missing_class_is_reported_with_the_existing_ones(tmp_path: Path) -> N
         (b"\xff\xfe", "is not text"),
         (b"# coding: punycode\n" + b"a" * 1000, "has the encoding 'punycode'"),
         (b"# coding: nonsense\n", "is not text"),
-        (b"x = " + b"(" * 100_000, "is not Python"),
-        (b"x = " + b"-" * 100_000 + b"1", "is not Python"),
-        (b"x = a" + b".a" * 100_000, "is not Python"),
-        (b"x = 1" + b"+1" * 100_000, "is not Python"),
+        (b"x = " + b"(" * 100_000, "is not Python"),  # test_syntax.py has other deep texts
         (b"#" * 300_000, "is larger than"),
-        (b"x = " + b"9" * 6000, "is not Python"),
     ],
 )
 def test_no_content_raises(tmp_path: Path, content: bytes, problem: str) -> None:
     (tmp_path / "robot.py").write_bytes(content)
     source = find("robot:Robot", tmp_path)
     assert source.module_found
-    assert source.problem.startswith(problem)
+    assert str(source.problem).startswith(problem)
 
 
 def test_a_folder_with_the_name_of_the_file_is_not_a_module(tmp_path: Path) -> None:
@@ -223,9 +219,7 @@ def test_a_folder_with_the_name_of_the_file_is_not_a_module(tmp_path: Path) -> N
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 def test_a_module_of_another_user_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "robot").mkdir()
-    (tmp_path / "robot" / "__init__.py").write_text("class Robot: ...\n")
-    (tmp_path / "robot.py").write_text("class Robot: ...\n")
+    text = "class Robot: ...\n"
+    write_files(tmp_path, {"robot/__init__.py": text, "robot.py": text})
     os.chown(tmp_path / "robot.py", 65534, 65534)
-    source = find("robot:Robot", tmp_path)
-    assert source.problem == "belongs to another user"
+    assert find("robot:Robot", tmp_path).problem == "belongs to another user"

@@ -8,63 +8,69 @@ from pathlib import Path
 import pytest
 
 from composer.rules.behaviors import endless_loops
-from tests.unit.support.checking import diagnostics_in, diagnostics_of_each
+from tests.unit.support.checking import diagnostics_of_each, load_project
 
 SYSTEM = "system: demo\nnodes:\n  a: {behavior: code:Code, timers: {tick: {period_ms: 1000}}}\n"
 
-BLOCKING = {
-    "time.sleep(1.0)": "import time",
-    "sleep(1.0)": "from time import sleep",
-    "t.sleep(1.0)": "import time as t",
-    "input()": "",
-    "os.system('true')": "import os",
-    "run(['true'])": "from subprocess import run",
-    "subprocess.check_output(['true'])": "import subprocess",
-    "requests.get('http://robot')": "import requests",
-    "urlopen('http://robot')": "from urllib.request import urlopen",
-    "self.socket.recv(1024)": "",
-    "rclpy.spin_until_future_complete(self.node, future)": "import rclpy",
-    "self.executor.spin_until_future_complete(future)": "",
-    "self.plan_client.call(request)": "",
-    "self.helper()": "import time",
-    "[time.sleep(n) for n in (1, 2)]": "import time",
-}
-FINE = {
-    "self.clock.sleep(1.0)": "",
-    "self.clients.plan.call(request)": "",
-    "later(lambda: time.sleep(1.0))": "import time",
-    "self.queue.get_nowait()": "",
-    "self.input()": "",
-    "time.monotonic()": "import time",
-    "await asyncio.sleep(1.0)": "import asyncio",
-}
+#: Statements, their imports, and whether they block.
+STATEMENTS = [
+    ("time.sleep(1.0)", "import time", True),
+    ("sleep(1.0)", "from time import sleep", True),
+    ("t.sleep(1.0)", "import time as t", True),
+    ("input()", "", True),
+    ("os.system('true')", "import os", True),
+    ("run(['true'])", "from subprocess import run", True),
+    ("subprocess.check_output(['true'])", "import subprocess", True),
+    ("requests.get('http://robot')", "import requests", True),
+    ("urlopen('http://robot')", "from urllib.request import urlopen", True),
+    ("self.socket.recv(1024)", "", True),
+    ("rclpy.spin_until_future_complete(self.node, future)", "import rclpy", True),
+    ("self.executor.spin_until_future_complete(future)", "", True),
+    ("self.plan_client.call(request)", "", True),
+    ("self.helper()", "import time", True),
+    ("[time.sleep(n) for n in (1, 2)]", "import time", True),
+    ("self.clock.sleep(1.0)", "", False),
+    ("self.clients.plan.call(request)", "", False),
+    ("later(lambda: time.sleep(1.0))", "import time", False),
+    ("self.queue.get_nowait()", "", False),
+    ("self.input()", "", False),
+    ("time.monotonic()", "import time", False),
+    ("await asyncio.sleep(1.0)", "import asyncio", False),
+]
+CODE = """\
+{imports}
+
+class Code:
+    {kind} on_tick(self):
+        {statement}
+
+    def helper(self):
+        time.sleep(1.0)
+
+    def unused(self):
+        input()
+"""
 
 
 def test_calls_that_block_and_others(tmp_path: Path) -> None:
-    statements = BLOCKING | FINE
     projects = []
-    for statement, imports in statements.items():
+    for statement, imports, _ in STATEMENTS:
         kind = "async def" if "await" in statement else "def"
-        code = (
-            f"{imports}\n\n\nclass Code:\n    {kind} on_tick(self):\n        {statement}\n\n"
-            "    def helper(self):\n        time.sleep(1.0)\n\n"
-            "    def unused(self):\n        input()\n"
-        )
+        code = CODE.format(imports=imports, kind=kind, statement=statement)
         projects.append({"system.yaml": SYSTEM, "code.py": code})
-    for statement, found in zip(statements, diagnostics_of_each(projects, tmp_path), strict=True):
+    for case, found in zip(STATEMENTS, diagnostics_of_each(projects, tmp_path), strict=True):
         messages = [item.message for item in found if item.rule.name == "blocking-call"]
-        assert len(messages) == (statement in BLOCKING), statement
+        assert len(messages) == case[-1], case
         assert all(text.startswith("handler 'on_tick' of 'Code' blocks in '") for text in messages)
 
 
 def test_a_call_reached_by_two_handlers_is_reported_once(tmp_path: Path) -> None:
     system = SYSTEM.replace("{period_ms: 1000}}", "{period_ms: 1000}, tock: {period_ms: 1000}}")
-    methods = "".join(
-        f"    def {name}(self):\n        self.ask()\n\n" for name in ("on_tick", "on_tock")
-    )
-    source = f"class Code:\n{methods}    def ask(self):\n        input()\n"
-    (tmp_path / "code.py").write_text(source, encoding="utf-8")
-    [diagnostic] = diagnostics_in(system, tmp_path)
+    handler = "    def on_{}(self):\n        self.ask()\n\n"
+    code = f"class Code:\n{handler.format('tick')}{handler.format('tock')}"
+    code += "    def ask(self):\n        input()\n"
+    files = {"system.yaml": system, "code.py": code}
+    [diagnostic] = load_project(tmp_path, files).diagnostics
     assert diagnostic.primary.line == 9
 
 

@@ -10,6 +10,7 @@ from composer.base.diagnostics import Severity
 from tests.unit.support.checking import diagnostics_in, load_project
 
 SCAN = "type: sensor_msgs/msg/LaserScan"
+SENSOR = "'qos: sensor_data'"
 SERVER = "type: std_srvs/srv/Trigger, respond: {success: true}, service: ~/ask"
 LIDAR = f"""\
 nodes:
@@ -29,92 +30,65 @@ nodes:
     publishers: {out: {type: std_msgs/msg/String, qos: command, external: true}}%s
 chains: {all: {through: [camera.image, viewer.out], latency_ms: 5}}
 """
-#: A file, a rule, and the hints of its diagnostics.
-HINTS: dict[str, tuple[str, str, list[str | None]]] = {
-    "node names that would become equal": (
+#: A file, and the rules and hints of all its diagnostics.
+HINTS: list[tuple[str, list[str]]] = [
+    (
         "nodes: {a-b: {}, a b: {}, a_b: {}}",
-        "invalid-name",
-        ["rename it to 'a_b_2'", "rename it to 'a_b_3'"],
+        ["invalid-name: rename it to 'a_b_2'", "invalid-name: rename it to 'a_b_3'"],
     ),
-    "parameter names that would become equal": (
-        "nodes: {n: {parameters: {a-b: {type: bool}, a_b: {type: bool}}}}",
-        "invalid-name",
-        ["rename it to 'a_b_2'"],
-    ),
-    "copies whose names have all variables": (
+    ("nodes: {n: {parameters: {a-b: 1, a_b: 1}}}", ["invalid-name: rename it to 'a_b_2'"]),
+    (
         "nodes: {'n_${i}': {for_each: {i: [1, 1]}, on_activate: {log: hello}}}",
-        "duplicate-name",
-        ["give 'for_each' values that make the names different"],
+        ["duplicate-name: give 'for_each' values that make the names different"],
     ),
-    "copies whose names have some variables": (
-        "nodes: {'n_${i}': {for_each: {i: [1, 2], j: [1, 2]}, on_activate: {log: '${j}'}}}",
-        "duplicate-name",
-        ["make the names unique: 'n_${i}_${j}'"],
+    (
+        "nodes: {'n_${i}': {for_each: {i: [1, 2], j: [1, 2]}, on_activate: {log: 'to ${j}'}}}",
+        ["duplicate-name: make the names unique: 'n_${i}_${j}'"],
     ),
-    "a server with the private name already": (
+    (
         f"nodes: {{a: {{services: {{b: {{{SERVER}}}, ask: {{{SERVER}}}}}}}}}",
-        "duplicate-server",
-        ["rename one of them"],
+        ["duplicate-server: rename one of them"],
     ),
-    "a behavior with a dot instead of a colon": (
-        "nodes: {n: {behavior: lift.Lift}}",
-        "class-missing",
-        ["did you mean 'lift:Lift'?"],
-    ),
-    "a behavior without a class": (
-        "nodes: {n: {behavior: 'lift:'}}",
-        "class-missing",
-        ["write 'module:Class'"],
-    ),
-    "threads of an executor that has one": (
+    ("nodes: {n: {behavior: lift.Lift}}", ["class-missing: did you mean 'lift:Lift'?"]),
+    ("nodes: {n: {behavior: 'lift:'}}", ["class-missing: write 'module:Class'"]),
+    (
         "executors: {io: {threads: 4}}\nnodes: {n: {executor: io, on_activate: {log: hello}}}",
-        "executor-settings",
-        ["add 'kind: multi_threaded', or remove 'threads'"],
+        ["executor-settings: add 'kind: multi_threaded', or remove 'threads'"],
     ),
-    "a chain without timers": (
+    (
         CHAIN % (", budget_ms: 20, publish: {out: '{message}'}", ""),
-        "impossible-chain",
-        ["use shorter budgets, or allow a higher latency"],
+        ["impossible-chain: use shorter budgets, or allow a higher latency"],
     ),
-    "a chain with a timer": (
+    (
         CHAIN % (", log: x", "\n    timers: {t: {period_ms: 50, publish: {out: {data: x}}}}"),
-        "impossible-chain",
-        ["publish from the subscription, or use shorter timer periods"],
+        ["impossible-chain: publish from the subscription, or use shorter timer periods"],
     ),
-    "sensor data with a reliable subscription": (
+    (
         RELIABLE,
-        "unsuited-qos",
-        ["use 'qos: sensor_data' for it and for the subscriptions that request reliable QoS"],
+        [f"unsuited-qos: use {SENSOR} for it and for the subscriptions that request reliable QoS"],
     ),
-    "sensor data for external nodes": (
+    (
         LIDAR,
-        "unsuited-qos",
-        ["let subscriptions use 'qos: sensor_data'; a reliable publisher serves them too"],
+        [f"unsuited-qos: let subscriptions use {SENSOR}; a reliable publisher serves them too"],
     ),
-    "joint states, which consumers request reliably": (
-        LIDAR.replace("LaserScan", "JointState"),
-        "unsuited-qos",
-        [],
-    ),
-    "a variable of an include with for_each": (
+    # Consumers request joint states reliably.
+    (LIDAR.replace("LaserScan", "JointState"), []),
+    (
         "include:\n  - {file: other.yaml, for_each: {bay: [north, south]}, prefix: '${bay}_', "
         "arguments: {zone: '${side}'}}",
-        "unknown-variable",
-        ["'for_each' sets 'bay'"],
+        ["invalid-include: None", "unknown-variable: 'for_each' sets 'bay'"],
     ),
-    "a variable of a node type under another name": (
+    (
         "nodes: {n: {type: relay, variables: {kind: std_msgs/msg/String}}}",
-        "unknown-variable",
-        ["did you mean 'message_type'?"],
+        ["unknown-variable: did you mean 'message_type'?"],
     ),
-}
+]
 
 
-@pytest.mark.parametrize(("text", "rule", "hints"), HINTS.values(), ids=HINTS)
-def test_hint(tmp_path: Path, text: str, rule: str, hints: list[str | None]) -> None:
-    diagnostics = diagnostics_in(f"system: demo\n{text}\n", tmp_path)
-    found = [item for item in diagnostics if item.rule.name == rule]
-    assert [diagnostic.hint for diagnostic in found] == hints
+@pytest.mark.parametrize(("text", "hints"), HINTS)
+def test_hint(tmp_path: Path, text: str, hints: list[str]) -> None:
+    found = diagnostics_in(f"system: demo\n{text}\n", tmp_path)
+    assert [f"{item.rule.name}: {item.hint}" for item in found] == hints
     if text is RELIABLE:
         labels = [(label.message, label.span.line) for label in found[0].related]
         assert labels == [("'map.scan' requests it", 7)]

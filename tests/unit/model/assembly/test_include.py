@@ -187,18 +187,23 @@ def test_a_diagnostic_shows_the_way_to_its_file(tmp_path: Path) -> None:
     ]
 
 
-def test_comments_silence_in_the_file_and_where_it_is_included(tmp_path: Path) -> None:
-    unheard = "system: unheard\nnodes:\n  a: {publishers: {chatter: {type: std_msgs/msg/String, "
-    unheard += "qos: command}}}"
-    comment = "  # compose: ignore[publisher-without-subscription] people listen by hand"
-    for here, there, expected in (
+COMMENT = "  # compose: ignore[publisher-without-subscription] people listen by hand"
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "expected"),
+    [
         ("", "", ["part.yaml:3:20 publisher-without-subscription"]),
-        ("", comment, []),
-        (comment, "", []),
-    ):
-        files = {"part.yaml": f"{unheard}{there}\n"}
-        found = included(tmp_path, f"part.yaml{here}", files=files).diagnostics
-        assert reported(found) == expected
+        ("", COMMENT, []),
+        (COMMENT, "", []),
+    ],
+    ids=["without", "in the file", "where it is included"],
+)
+def test_comments_silence(tmp_path: Path, here: str, there: str, expected: list[str]) -> None:
+    port = "{chatter: {type: std_msgs/msg/String, qos: command}}"
+    part = f"system: unheard\nnodes:\n  a: {{publishers: {port}}}{there}\n"
+    found = included(tmp_path, f"part.yaml{here}", files={"part.yaml": part}).diagnostics
+    assert reported(found) == expected
 
 
 def test_a_comment_that_only_an_including_system_needs_is_used(
@@ -341,51 +346,44 @@ nodes:
     assert str(system.nodes[2].container) == "left_driver"
 
 
-#: Text of a file that is included many times, and the only report about it.
-REPEATED = {
-    "a misspelled 'arguments'": (
-        "argumnets: {text: hello}\nnodes:\n  a: {on_activate: {log: '${text}'}}\n",
-        "'argumnets' is not a key of a system",
-    ),
-    "a misspelled 'nodes'": (
-        "nodse: {a: {on_activate: {log: hello}}}\n", "'nodse' is not a key of a system",
-    ),
-    "a misspelled 'executors'": (
-        "executers: {fast: {kind: events}}\nnodes: {a: {executor: fast}}\n",
-        "'executers' is not a key of a system",
-    ),
-    "a misspelled 'qos_profiles'": (
+#: Text of a file that is included many times, and the misspelled key, the only one reported.
+REPEATED = [
+    ("argumnets: {text: hello}\nnodes: {a: {on_activate: {log: '${text}'}}}\n", "argumnets"),
+    ("nodse: {a: {on_activate: {log: hello}}}\n", "nodse"),
+    ("executers: {fast: {kind: events}}\nnodes: {a: {executor: fast}}\n", "executers"),
+    (
         "qos_profile: {odom: {depth: 3}}\nnodes:\n"
         "  a: {publishers: {p: {type: std_msgs/msg/String, qos: odom, external: true}}}\n",
-        "'qos_profile' is not a key of a system",
+        "qos_profile",
     ),
-    "a cycle": (
-        "nodes:\n  a: {lifecycle: {depends_on: [b]}}\n  b: {lifecycle: {depends_on: [a]}}\n", None,
-    ),
-    "a relative name": (
+    # A cycle, and a relative name.
+    ("nodes: {a: {lifecycle: {depends_on: [b]}}, b: {lifecycle: {depends_on: [a]}}}\n", None),
+    (
         "nodes:\n  a: {services: {ask: {type: std_srvs/srv/Trigger, service: ask/, "
-        "external: true, respond: {success: true}}}}\n", None,
+        "external: true, respond: {success: true}}}}\n",
+        None,
     ),
-}  # fmt: skip
+]
 
 
-@pytest.mark.parametrize(("text", "message"), REPEATED.values(), ids=REPEATED)
+@pytest.mark.parametrize(("text", "key"), REPEATED)
 def test_one_cause_in_a_file_that_is_included_many_times_is_reported_once(
-    tmp_path: Path, text: str, message: str | None
+    tmp_path: Path, text: str, key: str | None
 ) -> None:
-    include = "{file: part.yaml, prefix: p%d_, namespace: ns%d}"
-    if message is not None:
-        include = include.replace("}", ", overrides: {nodes: {a: {description: x}}}}")
-    whole = "".join(f"  - {include}\n" % (number, number) for number in range(31))
-    whole = f"system: whole\ninclude:\n{whole}"
-    if message is not None:
+    change = ", overrides: {nodes: {a: {description: x}}}" if key else ""
+    numbers = range(31)
+    includes = [
+        f"  - {{file: part.yaml, prefix: p{n}_, namespace: ns{n}{change}}}\n" for n in numbers
+    ]
+    whole = f"system: whole\ninclude:\n{''.join(includes)}"
+    if key:
         depends = ", ".join(f"p{number}_a" for number in range(31))
         whole += f"nodes:\n  last: {{lifecycle: {{depends_on: [{depends}]}}}}\n"
     files = {"whole.yaml": whole, "part.yaml": f"system: part\n{text}"}
     [diagnostic] = load_project(tmp_path, files).diagnostics
-    if message is None:
+    if key:
+        assert diagnostic.message == f"'{key}' is not a key of a system"
+        assert str(diagnostic.hint).startswith("did you mean '")
+    else:
         [alone] = load(tmp_path / "part.yaml").diagnostics
         assert diagnostic.rule == alone.rule
-    else:
-        assert diagnostic.message == message
-        assert str(diagnostic.hint).startswith("did you mean '")
