@@ -58,6 +58,7 @@ parameters: {rate_hz: {type: double}}
 subscriptions:
   input: {type: '${message_type}', qos: command, publish: {output: '{message}'}}
 publishers: {output: {type: '${message_type}', qos: %s}}
+timers: {tick: {rate_hz: 1, publish: {output: {}}}}
 """
     assert load_project(tmp_path, {"repeater.yaml": repeater % "command"}).diagnostics == []
     assert load_project(tmp_path, {"nodes/repeater.yaml": repeater % "images"}).diagnostics == []
