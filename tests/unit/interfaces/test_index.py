@@ -96,7 +96,7 @@ def test_packages_are_found_below_a_folder_but_not_where_builds_are(tmp_path: Pa
     ("content", "reason"),
     [(b"bool \xff", "it is not UTF-8"), (b"#" * 1_000_001, "it is larger than 1,000,000 bytes")],
 )
-def test_a_file_that_cannot_be_read_is_a_problem(
+def test_a_file_that_is_unreadable_is_a_problem(
     tmp_path: Path, content: bytes, reason: str
 ) -> None:
     folder = package(tmp_path, "demo_msgs", msg_A="bool ok")
@@ -119,7 +119,7 @@ def test_only_requested_packages_are_read(tmp_path: Path) -> None:
     assert interfaces.problem("demo_msgs/msg/B") is not None
 
 
-def test_prefixes_come_from_the_environment_then_from_python(
+def test_prefixes_are_of_the_environment_then_of_python(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/opt/overlay::/opt/ros/jazzy")
@@ -181,9 +181,7 @@ def test_other_json_is_not_a_type_description(text: str) -> None:
         ("bool on\n---\nbool off\n", "a .msg file has 0 lines with '---'", 2),
     ],
 )
-def test_mistakes_in_definitions_are_found(
-    tmp_path: Path, text: str, message: str | None, line: int
-) -> None:
+def test_mistakes_in_definitions(tmp_path: Path, text: str, message: str | None, line: int) -> None:
     folder = package(tmp_path / "demo", "demo_msgs", msg_Demo=text, msg_Other="")
     interfaces = Interfaces.load([tmp_path])
     problem = interfaces.problem("demo_msgs/msg/Demo")
@@ -210,9 +208,7 @@ def test_mistakes_in_definitions_are_found(
         ("int8 small 300", None),
     ],
 )
-def test_a_wrong_type_has_the_nearest_one_as_a_hint(
-    tmp_path: Path, field: str, hint: str | None
-) -> None:
+def test_the_nearest_type_is_the_hint(tmp_path: Path, field: str, hint: str | None) -> None:
     package(tmp_path / "demo", "demo_msgs", msg_Demo=f"{field}\n", msg_Other="bool on\n")
     assert Interfaces.load([tmp_path]).problem("demo_msgs/msg/Demo").hint == hint
 
@@ -233,7 +229,7 @@ def test_an_error_in_the_type_of_a_field_is_found_where_it_is(tmp_path: Path) ->
         ({"msg_Demo": "bool on\nOther other", "msg_Other": "int16 x"}, "demo_msgs/msg/Other"),
     ],
 )
-def test_changes_since_the_build_are_found(
+def test_changes_since_the_build(
     tmp_path: Path, source: dict[str, str], outdated: str | None
 ) -> None:
     package(tmp_path / "source", "demo_msgs", **source)
@@ -255,7 +251,7 @@ def test_changes_since_the_build_are_found(
     ],
     ids=["directly", "through another", "not at all"],
 )
-def test_a_message_must_not_contain_itself(
+def test_recursive_messages(
     tmp_path: Path, first: str, second: str, name: str | None, line: int
 ) -> None:
     folder = package(tmp_path / "demo", "demo", msg_First=first, msg_Second=second)

@@ -52,7 +52,7 @@ string name 'a'
 int8 LIMIT=1"""
 
 
-def test_comments_nested_messages_and_separators(
+def test_comments_and_nested_messages(
     interfaces: Interfaces, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for comments, expected in ((True, WITH_COMMENTS), (False, WITHOUT_COMMENTS)):

@@ -67,9 +67,7 @@ def test_a_quarter_turn_is_to_the_left() -> None:
 
 
 @given(TRANSFORM, TRANSFORM, VECTOR)
-def test_transforms_compose_as_matrices(
-    outer: Transform, inner: Transform, point: tuple[float, float, float]
-) -> None:
+def test_composition(outer: Transform, inner: Transform, point: tuple[float, float, float]) -> None:
     both = geometry.compose(outer, inner)
     expected = matrix(outer) @ matrix(inner)
     assert matrix(both) == pytest.approx(expected, abs=1e-6)
@@ -94,9 +92,7 @@ def angle_between(first: Quaternion, second: Quaternion) -> float:
 
 
 @given(quaternions(), quaternions(), RATIO)
-def test_rotations_are_interpolated_at_constant_speed(
-    first: Quaternion, second: Quaternion, ratio: float
-) -> None:
+def test_rotations_have_constant_speed(first: Quaternion, second: Quaternion, ratio: float) -> None:
     whole = angle_between(first, second)
     assume(whole < math.pi - 0.01)  # otherwise two arcs are equally short
     between = geometry.slerp(first, second, ratio)
@@ -106,9 +102,7 @@ def test_rotations_are_interpolated_at_constant_speed(
 
 
 @given(TRANSFORM, TRANSFORM, RATIO)
-def test_translations_are_interpolated_linearly(
-    first: Transform, second: Transform, ratio: float
-) -> None:
+def test_translations_are_linear(first: Transform, second: Transform, ratio: float) -> None:
     between = geometry.interpolate(first, second, ratio).translation
     ends = np.array(first.translation), np.array(second.translation)
     assert between == pytest.approx(ends[0] + (ends[1] - ends[0]) * ratio, abs=1e-9)

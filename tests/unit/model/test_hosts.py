@@ -112,9 +112,7 @@ SERVER = {"ROS_DISCOVERY_SERVER": "10.0.0.1:11811", "ROS_SUPER_CLIENT": "TRUE"}
         ),
     ],
 )
-def test_a_discovery_is_expressed_by_variables_of_ros(
-    text: str, variables: dict[str, str], tmp_path: Path
-) -> None:
+def test_variables_of_a_discovery(text: str, variables: dict[str, str], tmp_path: Path) -> None:
     arguments = "arguments: {at: 10.0.0.1, port: 11811}\n" if "${" in text else ""
     whole = f"system: robot\n{arguments}discovery: {text}\n{NODES}"
     system = valid_system(tmp_path, {"robot.yaml": whole})
@@ -199,7 +197,7 @@ def test_nodes_have_processes_by_name_pattern_and_key(system: System) -> None:
     assert system.hosts[0].setup == ("env.sh",)
 
 
-def test_a_process_only_takes_failed_nodes_down_and_knows_how_far_nodes_start(
+def test_a_process_takes_failed_nodes_down_and_knows_how_far_nodes_start(
     system: System,
 ) -> None:
     member = member_system(system, "vision", {"camera_front": PrimaryState.INACTIVE})

@@ -72,9 +72,7 @@ def test_the_three_patterns() -> None:
     ("offered", "requested", "fits"),
     [(10.0, 10.0, True), (10.0, 20.0, True), (20.0, 10.0, False), (5.0, None, True)],
 )
-def test_a_period_offered_must_not_be_longer(
-    policy: str, offered: float | None, requested: float | None, fits: bool
-) -> None:
+def test_periods(policy: str, offered: float | None, requested: float | None, fits: bool) -> None:
     found = incompatibilities(
         replace(WEAK, **{policy: offered}), replace(WEAK, **{policy: requested})
     )

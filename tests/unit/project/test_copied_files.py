@@ -113,9 +113,7 @@ def test_patterns(tmp_path: Path, file: str, pattern: str, ignored: set[str]) ->
     "written",
     ["keys/id", "./keys/../keys/id", "~/robot/keys/id", "{root}/keys/id", "link/id", "..id"],
 )
-def test_private_keys_of_hosts_stay(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str
-) -> None:
+def test_keys_of_hosts_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     root = tmp_path / "robot"
     write(root, {"keys/id": "SECRET", "..id": "SECRET", "robot.yaml": "x"})

@@ -75,7 +75,7 @@ def test_installed_packages_and_files_of_other_programs_are_not_checked(tmp_path
     assert (found.files, found.foreign) == ((), tuple(tmp_path / name for name in foreign))
 
 
-def test_links_are_followed_in_the_project_only(
+def test_links_in_the_project_only(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     secret = tmp_path_factory.mktemp("elsewhere") / "secret.yaml"

@@ -50,9 +50,7 @@ def test_a_type_name_never_leads_out_of_the_folder(project: Path) -> None:
     assert node_types.find("a" * 5000) is None
 
 
-def test_links_may_lead_about_in_the_project_only(
-    project: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_links_in_the_project_only(project: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     elsewhere = tmp_path_factory.mktemp("elsewhere")  # it has the composer's types only
     assert NodeTypes.of(Project.at(elsewhere)).folders == (nodes_folder(),)
     (elsewhere / "secret.yaml").write_text("node: relay\n")
@@ -115,7 +113,7 @@ def test_packages_of_overlays_come_first(prefixes: tuple[Path, Path]) -> None:
     assert installed_systems()["blink"] == over / "systems" / "blink.yaml"
 
 
-def test_types_are_found_after_those_of_the_project_and_before_built_in_ones(
+def test_types_of_packages_are_before_built_in_ones(
     prefixes: tuple[Path, Path], tmp_path: Path
 ) -> None:
     share = install(prefixes[0], "lamps")
@@ -131,9 +129,7 @@ def test_types_are_found_after_those_of_the_project_and_before_built_in_ones(
     assert types.find("blinker") == own
 
 
-def test_a_system_uses_an_installed_type_with_its_behavior(
-    prefixes: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_a_system_uses_an_installed_type(prefixes: tuple[Path, Path], tmp_path: Path) -> None:
     install(prefixes[0], "lamps")
     text = "system: own\nnodes: {lamp: {type: blinker}}\n"
     (node,) = valid_system(tmp_path / "home", {"own.yaml": text}).nodes
@@ -144,7 +140,7 @@ def test_a_system_uses_an_installed_type_with_its_behavior(
     assert "did you mean 'lamps/blink'?" in compose("run", "lamps/blnk", "--dry-run").err
 
 
-def test_links_of_a_symlink_install_lead_to_the_sources(
+def test_links_of_a_symlink_install_are_followed(
     prefixes: tuple[Path, Path], tmp_path: Path
 ) -> None:
     share = install(prefixes[0], "lamps")
@@ -159,7 +155,7 @@ def test_links_of_a_symlink_install_lead_to_the_sources(
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may change owners")
-def test_packages_of_other_users_are_not_used(
+def test_packages_of_other_users(
     prefixes: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     share = install(prefixes[0], "lamps")

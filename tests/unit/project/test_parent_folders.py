@@ -29,9 +29,7 @@ def give_away(path: Path, owner: int = OTHER_USER) -> Path:
 
 @needs_root
 @pytest.mark.parametrize("name", ["nodes", "interfaces", "composer.yaml"])
-def test_what_another_user_has_put_into_a_parent_folder_is_not_used(
-    tmp_path: Path, mine: Path, name: str
-) -> None:
+def test_files_of_another_user_in_a_parent_folder(tmp_path: Path, mine: Path, name: str) -> None:
     found = tmp_path / name
     if name == "composer.yaml":
         (tmp_path / "nodes").mkdir()
@@ -54,7 +52,7 @@ def test_what_another_user_has_put_into_a_parent_folder_is_not_used(
 
 @needs_root
 @pytest.mark.parametrize("given", ["the parent folder", "a link"])
-def test_what_is_in_a_folder_or_behind_a_link_of_another_user_is_not_used(
+def test_folders_and_links_of_another_user_are_not_used(
     tmp_path: Path, mine: Path, given: str
 ) -> None:
     (tmp_path / "drafts").mkdir()

@@ -91,9 +91,7 @@ MANY = f"ignore: [{'qos-implicit, ' * 501}]"
         ("[", 1, 1, "this '[' is not closed"),
     ],
 )
-def test_a_wrong_setting_is_a_diagnostic_at_its_place(
-    tmp_path: Path, text: str, line: int, column: int, message: str
-) -> None:
+def test_wrong_settings(tmp_path: Path, text: str, line: int, column: int, message: str) -> None:
     root = tmp_path / "project"
     write_files(root, {"composer.yaml": text, "a.yaml": "system: a\nnodes: {one: {}}\n"})
     (tmp_path / "elsewhere").mkdir()
@@ -110,7 +108,7 @@ def test_settings_may_be_looked_at_alone(tmp_path: Path) -> None:
     assert load_project(tmp_path, {"composer.yaml": "strict: true\n"}).diagnostics == []
 
 
-def test_settings_are_not_read_from_elsewhere(
+def test_settings_are_of_the_project(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     secret = tmp_path_factory.mktemp("elsewhere") / "secret"
@@ -133,9 +131,7 @@ PUBLISHER, IMPLICIT = ("publisher-without-subscription", "info"), ("qos-implicit
         ("severity: {qos-implicit: error}\nignore: [RC3]", {("qos-implicit", "error")}),
     ],
 )
-def test_rules_are_ignored_selected_and_weighed_but_errors_stay(
-    settings: str, expected: set[tuple[str, str]], tmp_path: Path
-) -> None:
+def test_rules_are_selected(settings: str, expected: set[tuple[str, str]], tmp_path: Path) -> None:
     files = {"talker.yaml": TALKER, "composer.yaml": settings}
     diagnostics = load_project(tmp_path, files).diagnostics
     assert len(diagnostics) == len(expected)
@@ -145,9 +141,7 @@ def test_rules_are_ignored_selected_and_weighed_but_errors_stay(
     assert ("unknown-interface", "error") in {(i.rule.name, i.severity.value) for i in diagnostics}
 
 
-def test_no_settings_apply_to_what_comes_with_the_composer(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_settings_apply_to_own_systems(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The environment of a project is often in a folder of the project."""
     share = tmp_path / ".venv" / "share"
     for name in ("systems", "nodes"):

@@ -43,7 +43,7 @@ BAD_CHECKERS = {
 
 
 @pytest.mark.parametrize("name", BAD_CHECKERS)
-def test_checker_that_fails_is_a_note(
+def test_failing_checker_is_a_note(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code, reason = BAD_CHECKERS[name]
@@ -61,18 +61,14 @@ def test_checker_that_fails_is_a_note(
     assert reason in found.message
 
 
-def test_project_without_the_checker_is_checked_by_the_rules(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rules_apply_without_the_checker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "code.py").write_text("class Counter:\n    def on_tik(self):\n        pass\n")
     assert sorted(rules_broken(SYSTEM, tmp_path)) == ["missing-handler", "not-checked"]
 
 
-def test_problems_of_unchanged_files_are_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_problems_of_same_files_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "code.py").write_text(CODE % "kept")
     found = diagnostics_in(SYSTEM, tmp_path)
@@ -112,7 +108,7 @@ PROBLEMS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("begin", "line"), PROBLEMS.values(), ids=PROBLEMS)
-def test_growth_with_problems(
+def test_problems_grow(
     begin: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

@@ -132,7 +132,7 @@ def test_imports_that_fail(
     assert (item.rule.name, item.primary.text, item.hint) == (rule, text, hint), code
 
 
-def test_modules_that_are_found_at_run_time_and_imports_that_succeed_or_need_not(
+def test_imports_that_succeed_or_need_not(
     reported: Mapping[tuple[str, int], Diagnostic],
 ) -> None:
     for place, text in ((("searching", 3), "meter"), (("loading", 3), "motoor")):

@@ -109,7 +109,7 @@ SUBSCRIPTION = "{in: {type: std_msgs/msg/String, publish: {out: {}}}}"
     ],
     ids=["a timer", "another handler too", "a subscription too", "without a handler"],
 )
-def test_the_rate_is_that_of_the_timer_whose_handler_publishes(
+def test_the_rate_of_a_timer(
     python: str, system: str, rates_hz: dict[str, float], tmp_path: Path
 ) -> None:
     assert publishing_rates_hz(sender(tmp_path, python, system)) == rates_hz

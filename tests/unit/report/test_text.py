@@ -44,9 +44,7 @@ def test_long_lines_are_truncated() -> None:
 @pytest.mark.parametrize(
     ("text", "span", "marks"), [("text: |\n  much", (1, 7, 500), "       ^"), ("", (1, 1, 1), " ^")]
 )
-def test_a_value_that_ends_behind_the_line_is_marked_to_the_end_of_the_line(
-    text: str, span: tuple[int, int, int], marks: str
-) -> None:
+def test_marks_end_with_the_line(text: str, span: tuple[int, int, int], marks: str) -> None:
     found = replace(diagnostic("a", "a"), primary=Span(SourceFile("a.yaml", text), *span))
     lines = render([found]).splitlines()[1:5]
     line = text.split("\n", maxsplit=1)[0]

@@ -116,9 +116,7 @@ def test_parameters_and_ports_agree_with_the_class(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("qos", "severity"), [("sensor_data", Severity.INFO), ("state", Severity.WARNING)]
 )
-def test_another_qos_is_a_warning_if_another_end_does_not_match(
-    qos: str, severity: Severity, tmp_path: Path
-) -> None:
+def test_another_qos_and_the_other_end(qos: str, severity: Severity, tmp_path: Path) -> None:
     port = f"type: std_msgs/msg/String, topic: /text, qos: {qos}"
     system = (
         "system: a\nnodes:\n"

@@ -42,9 +42,7 @@ EXPECTED = (
         ("talker", NOT_FOUND.format("talker"), EXPECTED.format("talker.py")),
     ],
 )
-def test_a_missing_module_is_reported_with_the_nearest_name(
-    module: str, message: str, hint: str, tmp_path: Path
-) -> None:
+def test_a_missing_module_has_a_hint(module: str, message: str, hint: str, tmp_path: Path) -> None:
     node = f"{{class: '{module}:Camera', arguments: {{device: x}}}}"
     files = {
         "robot.yaml": f"system: robot\nnodes: {{camera: {node}}}\n",
@@ -77,7 +75,7 @@ timers: {tick: {period_ms: 100, publish: {tick: {}}}}
     assert rules_broken(text % ", log_level: debug", tmp_path) == ["setting-without-effect"]
 
 
-def test_missing_packages_are_reported_where_ros_is_installed(
+def test_missing_packages_with_ros_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.prefix", str(tmp_path))

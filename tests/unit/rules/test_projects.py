@@ -137,9 +137,7 @@ connections:
          "qos-incompatible", "state"),
     ],
 )  # fmt: skip
-def test_a_wrong_value_of_a_loop_is_reported_once(
-    old: str, new: str, rule: str, text: str, tmp_path: Path
-) -> None:
+def test_a_wrong_value_of_a_loop(old: str, new: str, rule: str, text: str, tmp_path: Path) -> None:
     (tmp_path / "part.yaml").write_text(PART, encoding="utf-8")
     assert diagnostics_in(FLEET, tmp_path) == []
     [found] = diagnostics_in(FLEET.replace(old, new), tmp_path)
@@ -159,9 +157,7 @@ def test_a_package_that_is_missing_is_reported_once_with_all_uses(tmp_path: Path
 
 
 @pytest.mark.parametrize("module", ["a", "z"], ids=["before the system", "after the system"])
-def test_a_missing_package_of_a_port_is_an_error_in_files_of_any_name(
-    module: str, tmp_path: Path
-) -> None:
+def test_a_missing_package_is_an_error_in_files_of_any_name(module: str, tmp_path: Path) -> None:
     files = {
         "system.yaml": f"system: demo\nnodes:\n  turtle:\n    class: {module}:Turtle\n"
         "    subscriptions: {pose: {type: turtlesim/msg/Pose, external: true}}\n",

@@ -86,7 +86,7 @@ def test_remappings_names_and_qos(node: str, expected: str, tmp_path: Path) -> N
         (BASES % "drive/wheels", f"base: {A}\ndrive/wheels: {A}", ""),
         (f"{PROGRAM}, name: planner", f"planer: {A}", "warning unmatched-parameters"),
         (f"{PROGRAM}, namespace: left", f"arm: {A}", "warning unmatched-parameters"),
-        # Names that are no text.
+        # Names that are lists.
         (f"{PROGRAM}, namespace: [a, b]", f"/a/b/arm: {A}", "error wrong-type"),
         (f"{WHEEL}, name: [hand]", f"hand: {A}", "error wrong-type"),
         (f"{WHEEL}, namespace: [a, b]", f"/a/b/arm: {A}", "error wrong-type"),

@@ -45,7 +45,7 @@ IGNORED = f"# compose: ignore[{UNHEARD}]"
         ),
     ],
 )  # fmt: skip
-def test_a_comment_applies_to_its_line(
+def test_comments(
     before: str, behind: str, expected: list[tuple[str, str]], tmp_path: Path
 ) -> None:
     found = diagnostics_in(SYSTEM.format(before=before, behind=behind), tmp_path)
@@ -94,7 +94,7 @@ def test_nothing_is_unused_if_the_file_cannot_be_read(tmp_path: Path) -> None:
     assert "unused-ignore" not in rules_broken(broken, tmp_path)
 
 
-def test_rules_in_a_comment_have_exact_spans_and_texts_are_no_comments() -> None:
+def test_rules_in_a_comment_have_exact_spans_and_texts_have_no_rules() -> None:
     source = SourceFile("a.yaml", "key: 1  # compose: ignore[one, RC301]")
     found = [(item.rule, item.line, item.span.column) for item in ignores_in(source)]
     assert found == [("one", 1, 27), ("RC301", 1, 32)]

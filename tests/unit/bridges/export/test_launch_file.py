@@ -62,7 +62,7 @@ def test_arguments_are_launch_arguments_and_the_system_gets_them(tmp_path: Path)
     assert ast.unparse(passed) == f"[{', '.join(values)}, 'namespace=field']"
 
 
-def test_a_launch_file_names_the_system_relative_to_itself(
+def test_the_path_of_the_system_is_relative(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

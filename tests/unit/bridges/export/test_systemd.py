@@ -78,9 +78,7 @@ def test_a_unit_runs_as_who_exports_it_with_the_files_that_are_set(tmp_path: Pat
         ("{workspace: ~/robot, user: robot}", None, []),
     ],
 )
-def test_units_of_another_computer_run_as_its_user_or_as_who_exports_them(
-    host: str, user: str | None, expected: list[str], tmp_path: Path
-) -> None:
+def test_users_of_units(host: str, user: str | None, expected: list[str], tmp_path: Path) -> None:
     system = system_of(tmp_path, PROCESSES.replace("jetson: {}", f"jetson: {host}"))
     found = units(*system, Installation(PYTHON, {}, remote, user), user=user is None)
     text = found[PurePosixPath("jetson/robot-c.service")]

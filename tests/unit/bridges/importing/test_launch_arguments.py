@@ -150,9 +150,7 @@ THREE = ["true", "false", "auto"]
         (THREE, {"default": "false", "choices": THREE}, "fast == 'true'"),
     ],
 )
-def test_as_few_nodes_as_possible(
-    choices: list[str], declared: object, is_fast: str, tmp_path: Path
-) -> None:
+def test_few_conditions(choices: list[str], declared: object, is_fast: str, tmp_path: Path) -> None:
     """What differs in a way that no argument gives has a condition for each."""
 
     def nodes(values: Values) -> Described:

@@ -52,7 +52,7 @@ C, D = ({"a": a, "b": b} for a, b in (("true", "x"), ("true", "y")))
         ([{"viewer": "true"}, {"viewer": "false"}], [1], {"unless": "viewer"}),
     ],
 )
-def test_the_condition_is_short(
+def test_conditions(
     visits: list[dict[str, str]], present: list[int], expected: dict[str, str]
 ) -> None:
     assert condition(visits, present) == expected

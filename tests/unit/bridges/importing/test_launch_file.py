@@ -75,7 +75,7 @@ def restarted(backoff_ms: int, **restart: int) -> dict[str, Any]:
         ),
     ],
 )
-def test_options_are_kept_or_listed(
+def test_options(
     changes: dict[str, Any], expected: dict[str, Any], left_out: tuple[str, ...]
 ) -> None:
     nodes, listed = described(node(**changes))

@@ -128,9 +128,7 @@ clients:
         ("plain:A", "class 'A' is not derived from rclpy's Node", "compose new node"),
     ],
 )
-def test_what_is_not_a_class_is_explained(
-    text: str, message: str, hint: str, tmp_path: Path
-) -> None:
+def test_other_things_are_explained(text: str, message: str, hint: str, tmp_path: Path) -> None:
     broken, plain = "class A(\n", "class A:\n    pass\n"
     write_files(tmp_path, {"driver.py": DRIVER, "broken.py": broken, "plain.py": plain})
     with pytest.raises(ClassNotFound, match=message) as raised:

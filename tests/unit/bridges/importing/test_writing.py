@@ -165,7 +165,7 @@ NAMES = ("exposure.1", "1st gain", "a..b.", "/topic", "", "a\x1b[2J", "${text}")
         *(([FoundParameter("a", *limits)], []) for limits in LIMITS),
     ],
 )
-def test_what_a_file_cannot_hold_is_left_out(
+def test_large_and_odd_values(
     parameters: list[FoundParameter], left_out: list[str], tmp_path: Path
 ) -> None:
     small = FoundParameter("small", "integer", 1)

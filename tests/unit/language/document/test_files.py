@@ -40,7 +40,7 @@ def test_missing_file_names_a_similar_one(tmp_path: Path) -> None:
     assert diagnostic_for(tmp_path / "nowhere" / "x.yaml").hint is None
 
 
-def test_what_is_no_file_is_not_opened(tmp_path: Path) -> None:
+def test_folders_pipes_and_devices_are_not_opened(tmp_path: Path) -> None:
     assert diagnostic_for(tmp_path).message == "expected a file, found a folder"
     os.mkfifo(tmp_path / "pipe.yaml")
     assert diagnostic_for(tmp_path / "pipe.yaml").message == "expected a file, found a pipe"

@@ -65,7 +65,7 @@ def test_a_value_gets_the_declared_type(name: str, written: str, value: object) 
         ("lidra", "sick", "unknown-variable", "'robot' has no argument 'lidra'", "'lidar'?"),
     ],
 )
-def test_a_wrong_value_is_reported_where_it_is_given(
+def test_wrong_values_are_reported(
     name: str, written: str, rule: str, message: str, hint: str
 ) -> None:
     tree = tree_of(f"{name}: {written}", "given")
@@ -132,7 +132,7 @@ def test_a_condition_decides_what_is_there(conditions: str, names: list[str]) ->
         ("lidar > 1", "malformed-variable", "lidar > 1", ""),
     ],
 )
-def test_a_wrong_condition_is_reported_once(
+def test_wrong_conditions_are_reported(
     condition: str, rule: str, place: str | None, hint: str
 ) -> None:
     _, diagnostics, *_ = expand(tree_of(CONDITIONAL % f"if: {condition}"), {})

@@ -167,9 +167,7 @@ DIRECT = "delivery: dds\n"
         ("part.yaml", DIRECT, DIRECT, []),
     ],
 )  # fmt: skip
-def test_the_place_of_diagnostics(
-    tmp_path: Path, include: str, rest: str, part: str, expected: list[str]
-) -> None:
+def test_places(tmp_path: Path, include: str, rest: str, part: str, expected: list[str]) -> None:
     files = {"part.yaml": f"system: part\n{part}nodes: {{a: {{}}}}\n"}
     assert reported(included(tmp_path, include, rest, files).diagnostics) == expected
 
@@ -206,9 +204,7 @@ def test_comments_silence(tmp_path: Path, here: str, there: str, expected: list[
     assert reported(found) == expected
 
 
-def test_a_comment_that_only_an_including_system_needs_is_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_comment_for_an_including_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     part = "system: part\nnodes:\n  b:\n    # compose: ignore[start-order] by hand\n"
     part += "    lifecycle: {depends_on: [a]}\n  a: {lifecycle: {autostart: active}}\n"
@@ -221,9 +217,7 @@ def test_a_comment_that_only_an_including_system_needs_is_used(
     assert together("part.yaml", "whole.yaml") == []
 
 
-def test_a_folder_reports_each_diagnostic_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_reports_diagnostics_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     wrong = """\
 system: wrong
@@ -247,9 +241,7 @@ connections:
     assert len(together("whole.yaml", "other.yaml")) == 2
 
 
-def test_a_cycle_is_one_diagnostic_wherever_it_starts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cycle_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names = {"c.yaml": "a", "a.yaml": "b", "b.yaml": "c"}
     texts = {name: f"system: {name[0]}\ninclude: [{other}.yaml]\n" for name, other in names.items()}
@@ -300,7 +292,7 @@ def test_no_link_leads_out(tmp_path: Path) -> None:
         ("{file: circle.yaml, overrides: {nodes: {left_viewer: {}}}}", "cycle"),
     ],
 )
-def test_nothing_is_a_consequence_of_what_is_not_there(
+def test_nothing_is_a_consequence_of_what_is_missing(
     tmp_path: Path, include: str, rule: str
 ) -> None:
     rest = """\
@@ -367,7 +359,7 @@ REPEATED = [
 
 
 @pytest.mark.parametrize(("text", "key"), REPEATED)
-def test_one_cause_in_a_file_that_is_included_many_times_is_reported_once(
+def test_one_cause_in_many_includes_is_reported_once(
     tmp_path: Path, text: str, key: str | None
 ) -> None:
     change = ", overrides: {nodes: {a: {description: x}}}" if key else ""

@@ -90,9 +90,7 @@ def test_an_unknown_name_in_a_connection_stays_as_written() -> None:
         ),
     ],
 )  # fmt: skip
-def test_names_of_ports_with_doubtful_connections(
-    connections: list[str], port: str, full_name: str
-) -> None:
+def test_names_with_doubtful_connections(connections: list[str], port: str, full_name: str) -> None:
     system = connected(*connections)
     assert full_names(system)[port] == full_name
     assert system.nodes[0].port("out").qos.profile.depth == 1

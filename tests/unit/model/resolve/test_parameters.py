@@ -178,7 +178,7 @@ OF_ALL = {"silent": True, "of_type": True, "own": False, "given": False}
     ],
     ids=["nodes", "the system", "the command line"],
 )
-def test_a_node_is_before_the_system(
+def test_node_and_system(
     text: str, option: bool, expected: dict[str, bool], tmp_path: Path
 ) -> None:
     system = loaded(tmp_path, f"system: s\n{text}", option=option)
@@ -193,9 +193,7 @@ def test_a_setting_overrides_everything(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("section", "others"), [("/silent", None), ("/**", True), ("/*", True)])
-def test_a_parameter_file_may_set_it_for_one_or_all(
-    section: str, others: bool | None, tmp_path: Path
-) -> None:
+def test_parameter_files_set_sim_time(section: str, others: bool | None, tmp_path: Path) -> None:
     content = f"{section}: {{ros__parameters: {{use_sim_time: true}}}}\n"
     text = "system: s\nparameter_files: [all.yaml]\nnodes: {silent: {}, other: {type: plain}}\n"
     system = loaded(tmp_path, text, files={"all.yaml": content})

@@ -81,7 +81,7 @@ MILLISECONDS, HERTZ = PeriodUnit
         (compile_expression("1 / parameters.none"), MILLISECONDS, "period_ms cannot be"),
     ],
 )  # fmt: skip
-def test_a_period_is_positive_and_finite(
+def test_periods_are_finite_and_above_0(
     value: float, unit: PeriodUnit, expected: float | str
 ) -> None:
     period = Period(value, unit, SPAN)

@@ -57,9 +57,7 @@ def reported(result: LoadResult) -> list[str]:
 
 
 @pytest.mark.parametrize("system", ["robot", "../systems/robot.yaml"])
-def test_a_stand_in_replaces_the_implementation_and_keeps_the_wiring(
-    folder: Path, system: str
-) -> None:
+def test_a_stand_in_replaces_an_implementation_and_keeps_wiring(folder: Path, system: str) -> None:
     result = scenario(folder, f"{STAND_IN}arguments: {{rate_hz: 20}}\n", system)
     assert reported(result) == []
     lidar, viewer = result.system.node("lidar"), result.system.node("viewer")

@@ -84,9 +84,7 @@ nodes:
     ("switch", "implied", "state"),
     [("true", {"server"}, PrimaryState.ACTIVE), ("false", set(), PrimaryState.INACTIVE)],
 )
-def test_implied_dependencies_can_be_switched_off(
-    switch: str, implied: set[str], state: PrimaryState
-) -> None:
+def test_dependencies_that_are_implied(switch: str, implied: set[str], state: PrimaryState) -> None:
     """Of two dependencies on a node the higher state counts: a service needs an active server."""
     system = system_of(SERVED.replace("SWITCH", switch))
     edges = dependency_edges(system)
@@ -134,7 +132,5 @@ def test_introspection_of_a_node_is_before_the_systems_and_the_types(tmp_path: P
         (Introspection(parameters=False, lifecycle_services=False), ("lifecycle", "parameters")),
     ],
 )
-def test_the_manager_answers_for_parameters_and_lifecycle(
-    introspection: Introspection, left: tuple[str, ...]
-) -> None:
+def test_what_is_left_to_the_manager(introspection: Introspection, left: tuple[str, ...]) -> None:
     assert introspection.left_to_manager == left

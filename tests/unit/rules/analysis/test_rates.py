@@ -67,9 +67,7 @@ BACK = RELAY.replace("relay:", "back:").replace("chatter", "x").replace("echo", 
         ),
     ],
 )
-def test_rates_of_topics(
-    topic: str, nodes: list[str], rate_hz: float | None, tmp_path: Path
-) -> None:
+def test_topic_rates(topic: str, nodes: list[str], rate_hz: float | None, tmp_path: Path) -> None:
     found = topic_hz(topic, "".join(nodes), tmp_path)
     assert found == (rate_hz and pytest.approx(rate_hz))
 
@@ -101,9 +99,7 @@ PUBLISH = "self.publishers.chatter.publish(None)"
         ({"on_configure": "self.send = self.publishers.chatter.publish"}, None),
     ],
 )
-def test_publishers_in_behaviors_are_recognized(
-    bodies: dict[str, str], rate_hz: float | None, tmp_path: Path
-) -> None:
+def test_rates_of_behaviors(bodies: dict[str, str], rate_hz: float | None, tmp_path: Path) -> None:
     assert topic_hz("/chatter", BEHAVIOR, tmp_path, behavior(**bodies)) == rate_hz
 
 
