@@ -110,7 +110,7 @@ def lists(depth: int, inside: str = "") -> str:
         (f"a: &a [{','.join('x' * (MAX_VALUES // 11))}]\nb: [{', '.join(['*a'] * 9)}]", True),
         (f"a: &a [{','.join('x' * (MAX_VALUES // 10))}]\nb: [{', '.join(['*a'] * 9)}]", False),
     ],
-    ids=lambda value: None if isinstance(value, bool) else f"{len(value)} characters",
+    ids=["deep", "too deep", "deep alias", "too deep alias", "values", "too many values"],
 )
 def test_depth_and_number_of_values(text: str, fits: bool) -> None:
     tree, diagnostics = parse_document(SourceFile("f", text))
