@@ -14,9 +14,10 @@ from composer.bridges.importing.found import FoundSystem
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
 from composer.launch.variants import all_visits, mark
+from composer.loading import load_files
 from composer.model.resolve import OverrideOptions
 from tests.unit.bridges.importing.test_launch_file import node
-from tests.unit.support.checking import load_project
+from tests.unit.support.checking import load_project, write_files
 
 Values = Mapping[str, str]
 Described = list[dict[str, Any]]
@@ -57,9 +58,10 @@ def visited(
 
 
 def errors(system: dict[str, Any], folder: Path) -> list[str]:
-    """Return the messages about errors in a system."""
-    diagnostics = load_project(folder, {"s.yaml": yaml.safe_dump(system)}).diagnostics
-    return [item.message for item in diagnostics if item.severity is Severity.ERROR]
+    """Return the messages about errors in a system, with any combination of its arguments."""
+    write_files(folder, {"s.yaml": yaml.safe_dump(system)})
+    [result] = load_files([folder / "s.yaml"])
+    return [item.message for item in result.diagnostics if item.severity is Severity.ERROR]
 
 
 def conditions(item: Mapping[str, Any]) -> dict[str, str]:
