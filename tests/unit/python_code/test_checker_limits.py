@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.diagnostics import Severity
+from composer.base.diagnostics import Diagnostic, Severity
 from composer.python_code.checker import check as check_module
 from composer.python_code.checker import pyrefly
-from tests.unit.support.checking import diagnostics_in, rules_broken
+from tests.unit.support.checking import load_project
 from tests.unit.support.growth import assert_linear
 
 SYSTEM = """\
@@ -42,6 +42,20 @@ BAD_CHECKERS = {
 }
 
 
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is kept of other tests."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def diagnostics_of(code: str, folder: Path) -> list[Diagnostic]:
+    return load_project(folder, {"system.yaml": SYSTEM, "code.py": code}).diagnostics
+
+
+def rules_of(code: str, folder: Path) -> list[str]:
+    return [item.rule.name for item in diagnostics_of(code, folder)]
+
+
 @pytest.mark.parametrize("name", BAD_CHECKERS)
 def test_failing_checker_is_a_note(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -54,39 +68,33 @@ def test_failing_checker_is_a_note(
     monkeypatch.setattr(sys, "executable", str(program.with_name("python")))
     if "took longer" in reason:  # the others end by themselves
         monkeypatch.setattr(pyrefly, "TIME_LIMIT_S", 2.0)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    (tmp_path / "code.py").write_text(CODE % name)
-    [found] = diagnostics_in(SYSTEM, tmp_path)
+    [found] = diagnostics_of(CODE % name, tmp_path)
     assert (found.rule.name, found.severity) == ("not-checked", Severity.INFO)
     assert reason in found.message
 
 
 def test_rules_apply_without_the_checker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    (tmp_path / "code.py").write_text("class Counter:\n    def on_tik(self):\n        pass\n")
-    assert sorted(rules_broken(SYSTEM, tmp_path)) == ["missing-handler", "not-checked"]
+    rules = rules_of("class Counter:\n    def on_tik(self):\n        pass\n", tmp_path)
+    assert sorted(rules) == ["missing-handler", "not-checked"]
 
 
 def test_problems_of_same_files_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    (tmp_path / "code.py").write_text(CODE % "kept")
-    found = diagnostics_in(SYSTEM, tmp_path)
+    found = diagnostics_of(CODE % "kept", tmp_path)
     assert [item.rule.name for item in found] == ["unknown-attribute"]
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))  # without the checker
-    assert diagnostics_in(SYSTEM, tmp_path) == found
+    assert diagnostics_of(CODE % "kept", tmp_path) == found
     (entry,) = (tmp_path / "ros2-composer" / "checks").iterdir()
     content = entry.read_bytes()
     for damaged in (b"", b"\xff", content[:-1], content[:40] + b"x" + content[41:]):
         entry.write_bytes(damaged)
-        assert [item.rule.name for item in diagnostics_in(SYSTEM, tmp_path)] == ["not-checked"]
+        assert rules_of(CODE % "kept", tmp_path) == ["not-checked"]
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 12), reason="this Python parses the file")
 def test_a_file_for_a_newer_python_is_a_note(tmp_path: Path) -> None:
     code = "class Counter:\n    def on_tick(self):\n        self.log.info(f'{self.a['b']}')\n"
-    (tmp_path / "code.py").write_text(code)
-    [found] = diagnostics_in(SYSTEM, tmp_path)
+    [found] = diagnostics_of(code, tmp_path)
     assert (found.rule.name, found.severity) == ("not-checked", Severity.INFO)
     assert "cannot parse the file, which needs a newer one" in found.message
     assert found.primary.line == 3
@@ -108,16 +116,12 @@ PROBLEMS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("begin", "line"), PROBLEMS.values(), ids=PROBLEMS)
-def test_problems_grow(
-    begin: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-
+def test_many_problems(begin: str, line: str, tmp_path: Path) -> None:
     def check(count: int) -> None:
         head = "from std_msgs.msg import String\nclass Counter:\n"
         lines = "".join(line.replace("#", str(number)) for number in range(count))
-        (tmp_path / "code.py").write_text(f"{head}{begin}{lines}# {time.monotonic_ns()}\n")
-        found = diagnostics_in(SYSTEM, tmp_path)
+        code = f"{head}{begin}{lines}# {time.monotonic_ns()}\n"
+        found = diagnostics_of(code, tmp_path)
         is_limited = any("the rest is not shown" in item.message for item in found)
         assert is_limited == (count > check_module.MAX_FINDINGS)
 
