@@ -57,8 +57,10 @@ variables: {message_type: {description: The type.}}
 parameters: {rate_hz: {type: double}}
 subscriptions:
   input: {type: '${message_type}', qos: command, publish: {output: '{message}'}}
-publishers: {output: {type: '${message_type}', qos: %s}}
-timers: {tick: {rate_hz: 1, publish: {output: {}}}}
+publishers:
+  output: {type: '${message_type}', qos: command}
+  beat: {type: std_msgs/msg/String, qos: %s, external: true}
+timers: {tick: {rate_hz: 1, publish: {beat: {data: tick}}}}
 """
     assert load_project(tmp_path, {"repeater.yaml": repeater % "command"}).diagnostics == []
     assert load_project(tmp_path, {"nodes/repeater.yaml": repeater % "images"}).diagnostics == []
