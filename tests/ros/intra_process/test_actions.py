@@ -86,6 +86,14 @@ connections:
 """
 
 
+def text_of(delivery: str, kind: str = "events") -> str:
+    """Return the system; with ``copy``, the connection requires copies."""
+    text = TEXT.replace("KIND", kind)
+    if delivery == "copy":
+        return text.replace("DELIVERY", "auto") + COPIED
+    return text.replace("DELIVERY", delivery)
+
+
 def go(system: RunningSystem, max_velocity: float) -> Any:
     """Make the client send a goal and return its behavior; 0 m/s never arrives."""
     client = system.behavior("client")
@@ -96,20 +104,24 @@ def go(system: RunningSystem, max_velocity: float) -> Any:
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-@pytest.mark.parametrize("delivery", ["auto", "dds"])
+@pytest.mark.parametrize("delivery", ["auto", "copy", "dds"])
 def test_goals_have_the_same_outcomes_in_process_and_by_dds(
     tmp_path: Path, kind: str, delivery: str
 ) -> None:
-    text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
-    with running(text, tmp_path, going=MODULE) as system:
+    with running(text_of(delivery, kind), tmp_path, going=MODULE) as system:
         server = system.behavior("server")
         client = go(system, 1.0)
         wait_until(lambda: client.outcomes)
         assert client.outcomes[-1] == ("succeeded", "arrived")
         assert [item.progress_percent for item in client.feedback] == [0.0, 1.0, 2.0]
-        straight = delivery == "auto"
-        assert (server.goals[0] is client.goals[0]) is straight
-        assert (server.results[0] is client.results[0]) is straight
+        for there, here in (
+            (server.goals, client.goals),
+            (server.feedback, client.feedback),
+            (server.results, client.results),
+        ):
+            assert there == here
+            shared = [one is other for one, other in zip(there, here, strict=True)]
+            assert shared == [delivery == "auto"] * len(here)
 
         go(system, -1.0)
         wait_until(lambda: len(client.outcomes) == 2)
@@ -152,8 +164,7 @@ def test_a_goal_that_another_thread_runs_at_once_is_canceled_with_its_result(
         return task
 
     monkeypatch.setattr(NodeContext, "spawn", spawn_and_pause)
-    text = TEXT.replace("KIND", "multi_threaded").replace("DELIVERY", "auto")
-    with running(text, tmp_path, going=MODULE) as system:
+    with running(text_of("auto", "multi_threaded"), tmp_path, going=MODULE) as system:
         client = go(system, 0.0)
         wait_until(lambda: client.feedback and client.sent)
         system.spawn("client", client.turn_back())
@@ -174,9 +185,8 @@ def test_the_results_of_ended_goals_are_not_kept(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(actions, "KEPT_STATUSES", 2)
-    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto")
     of_other_tests = count_goals()
-    with running(text, tmp_path, going=MODULE) as system:
+    with running(text_of("auto", kind), tmp_path, going=MODULE) as system:
         outcomes = system.behavior("client").outcomes
         for count in range(1, 8):
             go(system, 1.0)
@@ -185,8 +195,7 @@ def test_the_results_of_ended_goals_are_not_kept(
 
 
 def test_an_external_node_can_cancel_a_goal_of_the_process(tmp_path: Path) -> None:
-    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
-    with running(text, tmp_path, going=MODULE) as system:
+    with running(text_of("auto"), tmp_path, going=MODULE) as system:
         client = go(system, 0.0)
         wait_until(lambda: client.feedback)
         peer = Peer()
@@ -197,25 +206,3 @@ def test_an_external_node_can_cancel_a_goal_of_the_process(tmp_path: Path) -> No
         assert len(answer.goals_canceling) == 1
         wait_until(lambda: client.outcomes)
         assert client.outcomes == [("canceled", "turned back")]
-
-
-@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-@pytest.mark.parametrize("copied", [False, True])
-def test_both_endpoints_have_the_same_objects_unless_isolated(
-    tmp_path: Path, kind: str, copied: bool
-) -> None:
-    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
-    with running(text, tmp_path, going=MODULE) as system:
-        server = system.behavior("server")
-        client = go(system, 1.0)
-        wait_until(lambda: client.outcomes)
-        assert client.outcomes == [("succeeded", "arrived")]
-        for there, here in (
-            (server.goals, client.goals),
-            (server.feedback, client.feedback),
-            (server.results, client.results),
-        ):
-            assert there == here
-            assert [one is not other for one, other in zip(there, here, strict=True)] == [
-                copied
-            ] * len(here)

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import nav_msgs.msg
 import pytest
-from std_msgs.msg import Int64
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import Image, Imu, JointState, LaserScan
+from std_msgs.msg import Header, String
 
 from composer.model import LogLevel
 from composer.runtime.host_options import HostOptions
+from composer.runtime.intra_process.publisher import copy_of
 from tests.ros.support.in_process import running, wait_until
 
 SENT = 30
@@ -97,64 +102,28 @@ def test_every_combination_of_qos_delivers_the_same_in_process_and_by_dds(
         assert same is (delivery == "auto")
 
 
-COPIED = """
-system: copied
+ISOLATED = """
+system: isolated
 nodes:
   source:
-    behavior: table:Source
+    behavior: isolated:Source
     publishers:
       shared: {type: std_msgs/msg/Int64}
       copied: {type: std_msgs/msg/Int64}
       by_dds: {type: std_msgs/msg/Int64}
-  shared: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
-  copied: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
-  by_dds: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
-connections:
-  - {topic: /shared, from: source.shared, to: shared.input}
-  - {topic: /copied, from: source.copied, to: copied.input, isolation: copy}
-  - {topic: /by_dds, from: source.by_dds, to: by_dds.input, delivery: dds}
-"""
-
-
-def test_a_connection_may_require_copies_or_dds(tmp_path: Path) -> None:
-    options = HostOptions(log_level=LogLevel.DEBUG)
-    with running(COPIED, tmp_path, options=options, table=MODULE) as system:
-        source = system.node("source")
-        sinks = {name: system.behavior(name) for name in ("shared", "copied", "by_dds")}
-
-        def publish_and_change() -> None:
-            for name in sinks:
-                message = Int64(data=1)
-                system.sender("source", name).publish(message)
-                message.data = 2
-
-        source.loop.run(publish_and_change)
-        wait_until(lambda: all(sink.received for sink in sinks.values()))
-        received = {name: [item.data for item in sink.received] for name, sink in sinks.items()}
-    said = [line for line in system.log() if "uses DDS only" in line]
-    assert said == [
-        f"{end} uses DDS only: 'delivery: dds' is set"
-        for end in ("publisher 'by_dds'", "subscription 'input'")
-    ]
-    assert received == {"shared": [2], "copied": [1], "by_dds": [1]}
-
-
-OF_THEIR_OWN = """
-system: own
-nodes:
-  source:
-    behavior: own:Source
-    publishers:
-      copied: {type: std_msgs/msg/Int64}
       latched: {type: std_msgs/msg/Int64, qos: state}
-  first: {behavior: own:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
-  second: {behavior: own:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  shared: {behavior: isolated:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  first: {behavior: isolated:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  second: {behavior: isolated:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  by_dds: {behavior: isolated:Changer, subscriptions: {input: {type: std_msgs/msg/Int64}}}
   late:
-    behavior: own:Changer
+    behavior: isolated:Changer
     lifecycle: {autostart: unconfigured}
     subscriptions: {input: {type: std_msgs/msg/Int64, qos: state}}
 connections:
+  - {topic: /shared, from: source.shared, to: shared.input}
   - {topic: /copied, from: source.copied, to: [first.input, second.input], isolation: copy}
+  - {topic: /by_dds, from: source.by_dds, to: by_dds.input, delivery: dds}
   - {topic: /latched, from: source.latched, to: late.input, isolation: copy}
 """
 CHANGERS = """
@@ -163,10 +132,10 @@ from std_msgs.msg import Int64
 
 class Source(Behavior):
     def send(self):
-        for publisher in (self.publishers.copied, self.publishers.latched):
+        for name in ("shared", "copied", "by_dds", "latched"):
             message = Int64(data=1)
-            publisher.publish(message)
-            message.data = 7
+            self.publishers[name].publish(message)
+            message.data = 2
 
 class Changer(Behavior):
     def on_configure(self):
@@ -178,41 +147,73 @@ class Changer(Behavior):
 """
 
 
-def test_each_receiver_has_its_own_copy_even_of_latched_messages(tmp_path: Path) -> None:
-    with running(OF_THEIR_OWN, tmp_path, own=CHANGERS) as system:
-        source = system.node("source")
-        source.loop.run(system.behavior("source").send)
+def test_a_connection_may_require_a_copy_for_each_receiver_or_dds(tmp_path: Path) -> None:
+    options = HostOptions(log_level=LogLevel.DEBUG)
+    with running(ISOLATED, tmp_path, options=options, isolated=CHANGERS) as system:
+        system.node("source").loop.run(system.behavior("source").send)
         system.change("late", "configure", "activate")
-        names = ("first", "second", "late")
+        names = ("shared", "first", "second", "by_dds", "late")
         wait_until(lambda: all(system.behavior(name).received for name in names))
-        assert [system.behavior(name).received for name in names] == [[1], [1], [1]]
+        received = [system.behavior(name).received for name in names]
+    assert received == [[2], [1], [1], [1], [1]]
+    said = [line for line in system.log() if "uses DDS only" in line]
+    assert said == [
+        f"{end} uses DDS only: 'delivery: dds' is set"
+        for end in ("publisher 'by_dds'", "subscription 'input'")
+    ]
 
 
 OVERRIDDEN = """
 system: overridden
-delivery: {whole}
+delivery: dds
 nodes:
   source:
     behavior: table:Source
-    publishers: {{one: {{type: std_msgs/msg/Int64}}, two: {{type: std_msgs/msg/Int64}}}}
-  one: {{behavior: table:Sink, subscriptions: {{input: {{type: std_msgs/msg/Int64}}}}}}
-  two: {{behavior: table:Sink, subscriptions: {{input: {{type: std_msgs/msg/Int64}}}}}}
+    publishers: {one: {type: std_msgs/msg/Int64}, two: {type: std_msgs/msg/Int64}}
+  one: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
+  two: {behavior: table:Sink, subscriptions: {input: {type: std_msgs/msg/Int64}}}
 connections:
-  - {{topic: /one, from: source.one, to: one.input, delivery: {one}}}
-  - {{topic: /two, from: source.two, to: two.input}}
+  - {topic: /one, from: source.one, to: one.input, delivery: auto}
+  - {topic: /two, from: source.two, to: two.input}
 """
 
 
-@pytest.mark.parametrize(("whole", "one"), [("auto", "dds"), ("dds", "auto")])
-def test_a_connection_overrides_the_system(tmp_path: Path, whole: str, one: str) -> None:
-    text = OVERRIDDEN.format(whole=whole, one=one)
-    with running(text, tmp_path, table=MODULE) as system:
-        source = system.node("source")
-        source.loop.run(lambda: system.behavior("source").send(["one", "two"], 1))
-        sinks = [system.behavior(name) for name in ("one", "two")]
-        wait_until(lambda: all(sink.received for sink in sinks))
-        same = [
-            sink.received[0] is sent
-            for sink, sent in zip(sinks, system.behavior("source").sent, strict=True)
-        ]
-        assert same == [one == "auto", whole == "auto"]
+def test_a_connection_overrides_the_system(tmp_path: Path) -> None:
+    with running(OVERRIDDEN, tmp_path, table=MODULE) as system:
+        source = system.behavior("source")
+        system.node("source").loop.run(lambda: source.send(["one", "two"], 1))
+        one, two = (system.behavior(name) for name in ("one", "two"))
+        wait_until(lambda: one.received and two.received)
+        assert one.received[0] is source.sent[0]
+        assert two.received[0] is not source.sent[1]
+
+
+MESSAGES = [
+    String(data="text"),
+    Image(header=Header(frame_id="camera"), data=bytes(range(256))),
+    Imu(orientation_covariance=[float(number) for number in range(9)]),
+    LaserScan(ranges=[1.0, 2.0]),
+    JointState(name=["left", "right"], position=[1.0, 2.0]),
+    nav_msgs.msg.Path(poses=[PoseStamped(), PoseStamped(header=Header(frame_id="map"))]),
+    nav_msgs.msg.Path(poses=(PoseStamped(),)),
+]
+
+
+def parts(value: Any) -> list[object]:
+    """Return all mutable parts of a message."""
+    if isinstance(value, str | bytes | int | float):
+        return []
+    if hasattr(value, "get_fields_and_field_types"):
+        inner = [getattr(value, name) for name in value.get_fields_and_field_types()]
+    else:
+        inner = list(value)
+    return [value, *(part for item in inner for part in parts(item))]
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+def test_a_copy_is_equal_and_shares_nothing_mutable(message: Any) -> None:
+    copy = copy_of(message)
+    assert copy == message
+    assert type(copy) is type(message)
+    shared = {id(part) for part in parts(message)} & {id(part) for part in parts(copy)}
+    assert not shared

@@ -136,7 +136,7 @@ def test_the_offsets_of_fields_are_those_of_the_headers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("middleware", [None, *REASONS])
-def test_every_message_arrives_once_with_any_middleware(
+def test_every_message_arrives_once_with_any_middleware_and_the_doctor_reports_it(
     middleware: str | None, tmp_path: Path, peer: Peer
 ) -> None:
     path = tmp_path / "fallback.yaml"
@@ -145,6 +145,9 @@ def test_every_message_arrives_once_with_any_middleware(
     outside = Sequences()
     with preloaded(middleware, tmp_path):
         running = RunningSystem(str(path), "--log-level", "debug", program=COMPOSE)
+        command = [*COMPOSE, "doctor", "--json"]
+        done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=100)
+    (checked,) = [item for item in json.loads(done.stdout) if item["area"] == "delivery"]
     with running as system:
         system.wait_for("2 of 3 nodes active")
         peer.node.create_subscription(
@@ -168,27 +171,16 @@ def test_every_message_arrives_once_with_any_middleware(
     warned = [line for line in system.lines if "topics within the process use DDS" in line]
     by_dds = [line for line in system.lines if "uses DDS only" in line]
     if middleware is None:
-        assert (warned, by_dds) == ([], [])
+        assert (warned, by_dds, checked["level"]) == ([], [], "ok")
     else:
         assert len(warned) == 1
         assert "[WARN]" in warned[0]
         assert REASONS[middleware] in warned[0]
         assert len(by_dds) == 6  # two publishers, four subscriptions
         assert all(line.endswith(REASONS[middleware]) for line in by_dds)
-
-
-@pytest.mark.parametrize("middleware", [None, *REASONS])
-def test_the_doctor_reports_it(middleware: str | None, tmp_path: Path) -> None:
-    with preloaded(middleware, tmp_path):
-        command = [*COMPOSE, "doctor", "--json"]
-        done = subprocess.run(command, capture_output=True, check=False, text=True, timeout=100)
-    (found,) = [item for item in json.loads(done.stdout) if item["area"] == "delivery"]
-    if middleware is None:
-        assert found["level"] == "ok"
-    else:
-        assert found["level"] == "note"
-        assert found["message"].endswith(REASONS[middleware])
-        assert "'delivery: dds'" in found["remedy"]
+        assert checked["level"] == "note"
+        assert checked["message"].endswith(REASONS[middleware])
+        assert "'delivery: dds'" in checked["remedy"]
 
 
 @pytest.mark.parametrize("reports_matches", [True, False])

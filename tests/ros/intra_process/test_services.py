@@ -81,6 +81,14 @@ connections:
 REFUSED = (False, "/server is inactive, not active")
 
 
+def text_of(delivery: str, kind: str = "events") -> str:
+    """Return the system; with ``copy``, the connection requires copies."""
+    text = TEXT.replace("KIND", kind)
+    if delivery == "copy":
+        return text.replace("DELIVERY", "auto") + COPIED
+    return text.replace("DELIVERY", delivery)
+
+
 def ask(system: RunningSystem, data: bool = True, timeout_ms: float | None = None) -> None:
     system.spawn("client", system.behavior("client").ask(data, timeout_ms))
 
@@ -93,20 +101,26 @@ def outcomes(system: RunningSystem, count: int) -> list[Any]:
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-@pytest.mark.parametrize("delivery", ["auto", "dds"])
+@pytest.mark.parametrize("delivery", ["auto", "copy", "dds"])
 def test_calls_have_the_same_outcomes_in_process_and_by_dds(
     tmp_path: Path, kind: str, delivery: str
 ) -> None:
-    text = TEXT.replace("KIND", kind).replace("DELIVERY", delivery)
-    with running(text, tmp_path, asking=MODULE) as system:
+    with running(text_of(delivery, kind), tmp_path, asking=MODULE) as system:
         client, server = (system.behavior(name) for name in ("client", "server"))
         ask(system)
         assert outcomes(system, 1)[-1] == (True, "request 1")
+        assert server.asked == client.requests
+        assert server.answers == client.answers
         assert (server.asked[0] is client.requests[0]) is (delivery == "auto")
+        assert (server.answers[0] is client.answers[0]) is (delivery == "auto")
+
+        system.node("client").loop.run(client.ask_and_go)  # it is not awaited
+        line = system.wait_for_log("did not answer")
+        assert line == "client 'ask': service '/ask' did not answer within 20 ms"
 
         ask(system, data=False, timeout_ms=300.0)
         assert outcomes(system, 2)[-1] == "CallTimeout"
-        wait_until(lambda: len(server.asked) == 2, "the request that times out")
+        wait_until(lambda: len(server.asked) == 3, "the requests that time out")
 
         system.change("server", "deactivate")
         ask(system)
@@ -124,15 +138,14 @@ def test_calls_have_the_same_outcomes_in_process_and_by_dds(
         wait_until(lambda: server.asked)
         system.change("client", "deactivate")
         assert outcomes(system, 5)[-1] == "CallCancelled"
-    counted = {entry.node: entry.calls for entry in system.end().nodes}
-    assert counted == {"/client": 4, "/server": 3}
+    counted = {entry.node: (entry.calls, entry.errors) for entry in system.end().nodes}
+    assert counted == {"/client": (5, 1), "/server": (4, 0)}
 
 
 def test_a_server_that_shuts_down_refuses_pending_requests_and_serves_external_clients(
     tmp_path: Path,
 ) -> None:
-    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
-    with running(text, tmp_path, asking=MODULE) as system:
+    with running(text_of("auto"), tmp_path, asking=MODULE) as system:
         peer = Peer()
         try:
             answer = peer.call(SetBool, "/ask", SetBool.Request(data=True))
@@ -149,10 +162,8 @@ def test_a_server_that_shuts_down_refuses_pending_requests_and_serves_external_c
 
 
 def test_concurrent_calls_end_each_at_its_own_timeout(tmp_path: Path) -> None:
-    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto")
-    with running(
-        text.replace("asking:Server}", "asking:Server, reentrant: true}"), tmp_path, asking=MODULE
-    ) as system:
+    text = text_of("auto").replace("asking:Server}", "asking:Server, reentrant: true}")
+    with running(text, tmp_path, asking=MODULE) as system:
         system.spawn("client", system.behavior("client").ask_at_once((90.0, 30.0, 60.0)))
         results = outcomes(system, 3)
         assert results == [
@@ -161,38 +172,8 @@ def test_concurrent_calls_end_each_at_its_own_timeout(tmp_path: Path) -> None:
         ]
 
 
-@pytest.mark.parametrize("delivery", ["auto", "dds"])
-def test_a_failed_call_that_is_not_awaited_is_logged(tmp_path: Path, delivery: str) -> None:
-    text = TEXT.replace("KIND", "events").replace("DELIVERY", delivery)
-    with running(text, tmp_path, asking=MODULE) as system:
-        client = system.node("client")
-        wait_until(lambda: system.has_server("client", "/ask"), "the server, which DDS discovers")
-        client.loop.run(system.behavior("client").ask_and_go)
-        line = system.wait_for_log("did not answer")
-        counted = system.summary("/client").errors
-    assert line == "client 'ask': service '/ask' did not answer within 20 ms"
-    assert counted == 1
-
-
-@pytest.mark.parametrize("kind", ["events", "multi_threaded"])
-@pytest.mark.parametrize("copied", [False, True])
-def test_both_endpoints_have_the_same_objects_unless_isolated(
-    tmp_path: Path, kind: str, copied: bool
-) -> None:
-    text = TEXT.replace("KIND", kind).replace("DELIVERY", "auto") + (COPIED if copied else "")
-    with running(text, tmp_path, asking=MODULE) as system:
-        client, server = (system.behavior(name) for name in ("client", "server"))
-        ask(system)
-        wait_until(lambda: client.answers)
-        assert server.asked == client.requests
-        assert server.answers == client.answers
-        assert (server.asked[0] is not client.requests[0]) is copied
-        assert (server.answers[0] is not client.answers[0]) is copied
-
-
 def test_a_copied_request_is_as_it_was_when_sent(tmp_path: Path) -> None:
-    text = TEXT.replace("KIND", "events").replace("DELIVERY", "auto") + COPIED
-    with running(text, tmp_path, asking=MODULE) as system:
+    with running(text_of("copy"), tmp_path, asking=MODULE) as system:
         client, server = (system.behavior(name) for name in ("client", "server"))
         system.spawn("client", client.ask_and_change())
         wait_until(lambda: client.answers)
