@@ -27,12 +27,6 @@ def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
         yield running
 
 
-@pytest.fixture
-def server(on: Bench) -> Iterator[ActionServer]:
-    with serving(on) as running:
-        yield running
-
-
 class serving:  # noqa: N801
     """An action server that takes three steps, or continues forever if it is slow."""
 
@@ -131,24 +125,16 @@ def answers(asking: Any) -> bool:
     return bool(future.done())
 
 
-class TestClient:
-    """Against a server in another process."""
-
-    @pytest.fixture
-    def client(self, on: Bench) -> Iterator[ActionClient]:
-        with peer("navigate", "navigate") as process:
-            wait_for_line(process, "serving")
-            client = own_client(on)
-            # Discovered in order: with this one, all entities of the client are known.
-            last = on.client(ListParameters, f"peer_{process.pid}/list_parameters")
-            wait_until(last.service_is_ready)
-            wait_until(lambda: answers(last), "the server knows of the client")
-            yield client
-            on.loop.remove(client)
-            client.destroy()
-        assert on.reports == []
-
-    def test_gets_acceptance_feedback_and_result(self, client: ActionClient) -> None:
+def test_a_client_gets_acceptance_feedback_and_result_of_another_process_and_cancels(
+    on: Bench,
+) -> None:
+    with peer("navigate", "navigate") as process:
+        wait_for_line(process, "serving")
+        client = own_client(on)
+        # Discovered in order: with this one, all entities of the client are known.
+        last = on.client(ListParameters, f"peer_{process.pid}/list_parameters")
+        wait_until(last.service_is_ready)
+        wait_until(lambda: answers(last), "the server knows of the client")
         seen: list[float] = []
         handle = wait_for(
             client.send_goal_async(
@@ -162,15 +148,17 @@ class TestClient:
         assert end.result.message == "arrived"
         wait_until(lambda: seen == [0.0, 1.0, 2.0])
 
-    def test_cancels(self, client: ActionClient) -> None:
-        """Once the goal runs: rclpy's server loses one that is canceled just before it executes."""
         feedback = threading.Event()
         handle = wait_for(
             client.send_goal_async(
                 Navigate.Goal(max_velocity=0.1), feedback_callback=lambda _: feedback.set()
             )
         )
+        # Otherwise rclpy's server loses a goal that is canceled just before it executes.
         wait_until(feedback.is_set, "the goal runs")
         result = handle.get_result_async()
         assert len(wait_for(handle.cancel_goal_async()).goals_canceling) == 1
         assert wait_for(result).status == GoalStatus.STATUS_CANCELED
+        on.loop.remove(client)
+        client.destroy()
+    assert on.reports == []

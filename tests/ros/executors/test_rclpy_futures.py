@@ -10,7 +10,7 @@ import pytest
 from rclpy.task import Future as RclpyFuture
 
 from composer.runtime.executors.futures import Future, wrap_future
-from composer.runtime.executors.strand import SerialStrand, Strand
+from composer.runtime.executors.strand import SerialStrand
 from composer.runtime.executors.tasks import Task
 
 
@@ -33,7 +33,7 @@ class Calls:
             self.waiting.popleft()()
 
 
-def start(calls: Calls, awaited: Any, strand: Strand | None = None) -> Future[Any]:
+def start(calls: Calls, awaited: Any, on_strand: bool = False) -> Future[Any]:
     async def inner() -> Any:
         return await awaited
 
@@ -43,33 +43,25 @@ def start(calls: Calls, awaited: Any, strand: Strand | None = None) -> Future[An
     def report(what: str, error: BaseException) -> None:
         raise error
 
-    work = outer() if strand is None else strand.wrap(outer())
+    work = SerialStrand(calls).wrap(outer()) if on_strand else outer()
     future = Task(work, calls.call_soon, report, lambda _: None).start()
     calls.run()
     return future
 
 
-def test_an_rclpy_future_is_not_polled() -> None:
+@pytest.mark.parametrize("on_strand", [False, True])
+def test_an_rclpy_future_is_not_polled(on_strand: bool) -> None:
     calls = Calls()
     foreign = RclpyFuture()
-    outcome = start(calls, foreign)
-    assert calls.called == 1
-    foreign.set_result("answer")
-    calls.run()
-    assert outcome.result() == "answer"
-    assert calls.called == 2
-
-
-def test_an_rclpy_future_is_not_polled_on_a_strand_either() -> None:
-    calls = Calls()
-    foreign = RclpyFuture()
-    outcome = start(calls, foreign, SerialStrand(calls))
+    outcome = start(calls, foreign, on_strand)
     called = calls.called
     calls.run()
     assert calls.called == called
     foreign.set_result("answer")
     calls.run()
     assert outcome.result() == "answer"
+    if not on_strand:
+        assert (called, calls.called) == (1, 2)
 
 
 def test_an_rclpy_future_that_failed_raises_where_it_is_awaited() -> None:
@@ -82,23 +74,17 @@ def test_an_rclpy_future_that_failed_raises_where_it_is_awaited() -> None:
         outcome.result()
 
 
-def test_a_wrapped_future_has_the_outcome_of_the_rclpy_future() -> None:
-    foreign = RclpyFuture()
+def test_a_wrapped_future_has_the_outcome_of_the_rclpy_future_and_cancels_both_ways() -> None:
+    foreign, failing, canceled, canceling = (RclpyFuture() for _ in range(4))
     future = wrap_future(foreign)
     assert not future.done()
     foreign.set_result("answer")
     assert future.result() == "answer"
-    failing = RclpyFuture()
     failed = wrap_future(failing)
     failing.set_exception(ValueError("broken"))
     assert isinstance(failed.exception(), ValueError)
-
-
-def test_canceling_works_in_both_directions_of_a_wrapped_future() -> None:
-    foreign = RclpyFuture()
-    wrap_future(foreign).cancel()
-    assert foreign.cancelled()
-    foreign = RclpyFuture()
-    future = wrap_future(foreign)
-    foreign.cancel()
+    wrap_future(canceled).cancel()
+    assert canceled.cancelled()
+    future = wrap_future(canceling)
+    canceling.cancel()
     assert future.cancelled()

@@ -48,23 +48,21 @@ def test_keep_all_loses_no_message_of_a_burst(on: Bench) -> None:
     assert sorted(seen) == list(range(3000))
 
 
-@pytest.mark.parametrize("error", [ValueError, SystemExit, KeyboardInterrupt])
-def test_an_exception_in_a_callback_is_reported_and_the_next_message_arrives(
-    on: Bench, error: type[BaseException]
-) -> None:
+def test_an_exception_in_a_callback_is_reported_and_the_next_message_arrives(on: Bench) -> None:
+    errors = (ValueError, SystemExit, KeyboardInterrupt)
     seen: list[int] = []
 
     def fall_over(message: Int64) -> None:
         seen.append(message.data)
-        raise error
+        raise errors[message.data]
 
     on.subscribe(Int64, "numbers", fall_over)
     publisher = on.node.create_publisher(Int64, "numbers", 10)
     for number in range(3):
         publisher.publish(Int64(data=number))
-        wait_until(lambda number=number: number in seen)
-    wait_until(lambda: len(on.reports) == 3)
-    assert on.errors() == [error] * 3
+        wait_until(lambda number=number: len(on.reports) == number + 1)
+    assert seen == [0, 1, 2]
+    assert on.errors() == list(errors)
     assert all("'numbers'" in what and "fall_over" in what for what, _ in on.reports)
 
 
