@@ -114,13 +114,12 @@ def test_calls_have_the_same_outcomes_in_process_and_by_dds(
         assert (server.asked[0] is client.requests[0]) is (delivery == "auto")
         assert (server.answers[0] is client.answers[0]) is (delivery == "auto")
 
+        ask(system, data=False, timeout_ms=300.0)
+        assert outcomes(system, 2)[-1] == "CallTimeout"
+        wait_until(lambda: len(server.asked) == 2, "the request that times out")
         system.node("client").loop.run(client.ask_and_go)  # it is not awaited
         line = system.wait_for_log("did not answer")
         assert line == "client 'ask': service '/ask' did not answer within 20 ms"
-
-        ask(system, data=False, timeout_ms=300.0)
-        assert outcomes(system, 2)[-1] == "CallTimeout"
-        wait_until(lambda: len(server.asked) == 3, "the requests that time out")
 
         system.change("server", "deactivate")
         ask(system)

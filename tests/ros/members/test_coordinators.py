@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,23 +29,37 @@ from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system
 from tests.ros.support.system_process import RunningSystem as CommandProcess
 
 
+@contextmanager
+def started_by_hand(
+    folder: Path, text: str = TEXT, stderr: int = subprocess.DEVNULL
+) -> Iterator[tuple[Path, list[subprocess.Popen[str]]]]:
+    """Run both processes of the robot without a coordinator; return the file and the processes."""
+    path = folder / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    folder.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
+    members = [
+        subprocess.Popen([*command_of(path), "--process", name], stderr=stderr, text=True)
+        for name in ("sensing", "acting")
+    ]
+    try:
+        yield path, members
+    finally:
+        for member in members:
+            member.send_signal(signal.SIGINT)
+        for member in members:
+            member.wait(PATIENCE_S)
+
+
 @pytest.mark.timeout(200)
 def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Those that run here are awaited for longer.
     monkeypatch.setattr("composer.runtime.supervision.start_and_end.STARTED_REPORT_WITHIN_S", 0.0)
-    path = tmp_path / "robot.yaml"
     # With this backoff, the process returns before the coordinator starts one in its place.
     text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
     text = text.replace("  arm:\n", "  arm:\n    behavior: detector:Arm\n")
-    path.write_text(text, encoding="utf-8")
-    tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
-    members = [
-        subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.DEVNULL)
-        for name in ("sensing", "acting")
-    ]
-    try:
+    with started_by_hand(tmp_path, text) as (path, members):
         wait_until(lambda: len(running_managers(peer)) == 2, "the processes", 2.0 * PATIENCE_S)
         moves = coordinate_and_pause(path, peer)
         with split(tmp_path, text) as system:  # another one, and the pause goes on
@@ -82,16 +98,10 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             wait_until(lambda: len(found) > 10, "messages of nodes that are still active")
             assert not moves
         assert all(member.poll() is None for member in members)
-    finally:
-        for member in members:
-            member.send_signal(signal.SIGINT)
-        codes = [member.wait(PATIENCE_S) for member in members]
-    assert codes == [0, 0]
+    assert [member.returncode for member in members] == [0, 0]
 
 
-def stop_until_the_pause(
-    member: subprocess.Popen[bytes], system: RunningSystem, peer: Peer
-) -> None:
+def stop_until_the_pause(member: subprocess.Popen[str], system: RunningSystem, peer: Peer) -> None:
     """Stop the process of the detector; let it return before the pause is complete."""
     reports = peer.listen(String, "/lab/robot/acting/manager/state", STATE_QOS)
     wait_until(lambda: reports, "a report")
@@ -151,48 +161,28 @@ def forget(moves: list[TransitionEvent], goal: str) -> None:
 
 
 def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
-    path = tmp_path / "robot.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
-    members = [
-        subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.PIPE, text=True)
-        for name in ("sensing", "acting")
-    ]
-    try:
-        with split(tmp_path) as system:  # it starts both as well, at the same time
-            assert states(system) == {"active"}
-            for member, node in zip(members, ("camera", "detector"), strict=True):
-                if system.node(node).pid is not None:
-                    assert member.wait(60.0) == 1
-                    assert member.stderr is not None
-                    assert "already runs in ROS domain" in member.stderr.read()
-            assert "already runs" not in system.log_text()
-            assert not system.reported(NodeFailed)
-    finally:
-        for member in members:
-            member.send_signal(signal.SIGINT)
-            member.communicate(timeout=60.0)
+    # The coordinator starts both as well, at the same time.
+    with (
+        started_by_hand(tmp_path, stderr=subprocess.PIPE) as (_, members),
+        split(tmp_path) as system,
+    ):
+        assert states(system) == {"active"}
+        for member, node in zip(members, ("camera", "detector"), strict=True):
+            if system.node(node).pid is not None:
+                assert "already runs in ROS domain" in member.communicate(timeout=60.0)[1]
+                assert member.returncode == 1
+        assert "already runs" not in system.log_text()
+        assert not system.reported(NodeFailed)
 
 
 def test_the_last_counters_of_processes_that_stay(tmp_path: Path) -> None:
-    path = tmp_path / "robot.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    tmp_path.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
-    members = [
-        subprocess.Popen([*command_of(path), "--process", name], stderr=subprocess.DEVNULL)
-        for name in ("sensing", "acting")
-    ]
-    try:
+    with started_by_hand(tmp_path) as (_, members):
         wait_until(lambda: len(local_systems()) == 2, "the processes")
         with split(tmp_path) as system:
             found = system.node("arm").statistics
             wait_until(lambda: found.received > 20, "messages")
             outcome = system.stop()
         assert [member.poll() for member in members] == [None, None]
-    finally:
-        for member in members:
-            member.send_signal(signal.SIGINT)
-            member.wait(PATIENCE_S)
     camera, detector, arm = outcome.nodes
     # Each is deactivated after the nodes that receive its messages.
     assert camera.sent >= detector.received >= detector.sent >= arm.received > 20

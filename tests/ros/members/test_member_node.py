@@ -1,4 +1,4 @@
-"""A failed node of another process hangs only if reports say so."""
+"""Nodes of another process: what their reports say, and their counters over its lives."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from composer.model import ExecutorKind, LogLevel
 from composer.runtime.executors.futures import Future
 from composer.runtime.members import node as member_node
 from composer.runtime.members.context import ProcessUnavailable
+from composer.runtime.members.lives import NodeFigures
 from composer.runtime.members.node import MemberNode
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import TransitionOutcome
@@ -98,28 +99,18 @@ def restart_of_failed_node(
         yield on, node, process, on.loop.run_task(node.run_step("configure", lambda: False))
 
 
+@pytest.mark.parametrize("is_taken_down", [False, True])
 def test_a_node_hangs_only_if_late_reports_say_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_taken_down: bool
 ) -> None:
     with restart_of_failed_node(tmp_path, monkeypatch) as (on, node, process, restart):
         report(on, node, "active")  # the process was busy; this one may be older
         on.loop.run(lambda: None)
         assert not process.killed
-        report(on, node, "active")
+        report(on, node, "unconfigured" if is_taken_down else "active")
         wait_until(restart.done, "the end of the restart")
-        assert process.killed == "/lab/camera hangs"
-        assert not restart.result().success
-
-
-def test_a_node_that_is_taken_down_late_does_not_hang(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with restart_of_failed_node(tmp_path, monkeypatch) as (on, node, process, restart):
-        report(on, node, "active")
-        report(on, node, "unconfigured")
-        wait_until(restart.done, "the end of the restart")
-        assert not process.killed
-        assert restart.result().success
+        assert process.killed == ("" if is_taken_down else "/lab/camera hangs")
+        assert restart.result().success is is_taken_down
 
 
 class CutOff(Process):
@@ -151,3 +142,35 @@ def test_a_request_that_arrives_after_a_cut_is_not_that_of_a_user(tmp_path: Path
         on.loop.run(lambda: node.on_report(reported("active")))
         on.loop.run(lambda: node.on_report(reported("inactive")))
         assert events == ["activate active", "deactivate inactive"]  # now it is one
+
+
+def counted(errors: int, sent: int, host: str = "") -> NodeReport:
+    return NodeReport("/a", "active", errors=errors, sent={"/a": sent}, sent_hz=1.0, host=host)
+
+
+@pytest.mark.parametrize(
+    ("is_started_here", "first", "counts"),
+    [
+        pytest.param(True, [(2, 10)], [(2, 10), (3, 14)], id="counts go on"),
+        pytest.param(False, [(5, 100), (6, 101)], [(1, 1), (2, 5)], id="of an earlier run"),
+    ],
+)
+def test_counts_of_this_run_go_on_over_the_lives_of_a_process(
+    is_started_here: bool, first: list[tuple[int, int]], counts: list[tuple[int, int]]
+) -> None:
+    figures = NodeFigures()
+    for errors, sent in first:
+        figures.take(counted(errors, sent), "vm", is_started_here=is_started_here)
+    assert figures.current["errors"] == first[-1][0]
+    seen = [(figures.since_start["errors"], figures.since_start["sent"])]
+    figures.end_life()
+    figures.take(counted(1, 4), "vm", is_started_here=is_started_here)  # a new process
+    seen.append((figures.since_start["errors"], figures.since_start["sent"]))
+    assert seen == counts
+
+
+def test_the_host_is_that_of_the_process_unless_the_node_has_another_one() -> None:
+    figures = NodeFigures()
+    for host, expected in (("", "vm"), ("arm", "arm")):
+        figures.take(counted(0, 0, host), "vm", is_started_here=True)
+        assert figures.current["host"] == expected

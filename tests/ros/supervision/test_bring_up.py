@@ -62,27 +62,30 @@ def test_a_driver_that_fails_its_first_starts_is_restarted(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("policy", "required", "remark", "exit_code"),
+    ("policy", "required", "together", "remark"),
     [
-        ("isolate", "true", f"/driver is isolated: {NOT_READY}", 1),
-        ("restart", "true", f"/driver is given up: {NOT_READY}", 1),
-        ("restart", "false", f"/driver is given up: {NOT_READY}", 0),
-        ("shutdown", "false", f"/driver is isolated: {NOT_READY}", 0),
+        ("isolate", True, False, f"/driver is isolated: {NOT_READY}"),
+        ("restart", True, False, f"/driver is given up: {NOT_READY}"),
+        ("restart", False, False, f"/driver is given up: {NOT_READY}"),
+        ("shutdown", False, True, f"/driver is isolated: {NOT_READY}"),
     ],
 )
 def test_a_node_that_does_not_come_up_stops_only_those_that_depend_on_it(
-    tmp_path: Path, policy: str, required: str, remark: str, exit_code: int
+    tmp_path: Path, policy: str, required: bool, together: bool, remark: str
 ) -> None:
-    with running(robot(policy, required=required), tmp_path, driver=DRIVER) as system:
+    """All or nothing is not about a node that is not required."""
+    text = robot(policy, required=str(required).lower())
+    options = HostOptions(all_or_nothing=together, stop_within_s=20.0)
+    with running(text, tmp_path, options=options, driver=DRIVER) as system:
         (up,) = system.reported(BroughtUp)
-        assert up.is_complete is (required == "false")
+        assert up.is_complete is not required
         assert NOT_READY not in str(up), "the log has the reason already"
         wait_until(lambda: system.node("driver").state == "unconfigured", "the end of restarts")
         restarts = 2 if policy == "restart" else 0
         wait_until(lambda: len(system.reported(NodeFailed)) == restarts + 1, "the last failure")
         assert [system.node(name).state for name in ("base", "user")] == ["active", "inactive"]
         outcome = system.stop()
-    assert (outcome.exit_code, outcome.remarks) == (exit_code, (remark,))
+    assert (outcome.exit_code, outcome.remarks) == (int(required), (remark,))
 
 
 def test_nodes_start_without_one_whose_failure_is_ignored(tmp_path: Path) -> None:
@@ -108,15 +111,6 @@ def test_a_bring_up_is_rolled_back(tmp_path: Path, policy: str, together: bool) 
     assert "/base" in system.reported(RolledBack)[0].nodes
     assert not system.reported(BroughtUp)
     assert {node.state for node in outcome.nodes} == {"finalized"}
-
-
-def test_all_or_nothing_is_not_about_nodes_that_are_not_required(tmp_path: Path) -> None:
-    options = HostOptions(all_or_nothing=True, stop_within_s=20.0)
-    text = robot("isolate", required="false")
-    with running(text, tmp_path, options=options, driver=DRIVER) as system:
-        wait_until(lambda: system.reported(NodeFailed), "the failure")
-        assert system.node("base").state == "active"
-        assert system.stop().exit_code == 0
 
 
 FAILING = """

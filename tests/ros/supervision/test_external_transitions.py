@@ -26,6 +26,7 @@ SYSTEM = "systems/pipeline.yaml"
 SENSOR = "/perception/sensor_simulator"
 PLANNER = "/planning/planner"
 MOTOR = "/control/motor_controller"
+TRANSITIONS = 20_000
 UP, DOWN = ("configure", "activate"), ("deactivate", "cleanup")
 
 
@@ -88,25 +89,17 @@ def busy_processors(count: int) -> Iterator[None]:
         pytest.param([(SENSOR, PLANNER), (MOTOR,)], id="two managers"),
     ],
 )
-@pytest.mark.parametrize(
-    "count",
-    [
-        pytest.param(
-            20_000,
-            marks=[pytest.mark.soak, pytest.mark.timeout(1800)],
-        )
-    ],
-)
-def test_no_external_transition_is_undone(
-    peer: Peer, managed: list[tuple[str, ...]], count: int
-) -> None:
+@pytest.mark.soak
+@pytest.mark.timeout(1800)
+def test_no_external_transition_is_undone(peer: Peer, managed: list[tuple[str, ...]]) -> None:
     with RunningSystem(SYSTEM) as system, busy_processors(2):
         system.wait_for("3 of 3 nodes active")
-        managers = [LifecycleManager(peer, nodes, count // len(managed)) for nodes in managed]
+        each = TRANSITIONS // len(managed)
+        managers = [LifecycleManager(peer, nodes, each) for nodes in managed]
         started = len(system.lines)
         for manager in managers:
             manager.send()
-        while any(manager.done < count // len(managed) for manager in managers):
+        while any(manager.done < each for manager in managers):
             done = sum(manager.done for manager in managers)
             wait_until(partial(has_progress, managers, done), "a response")
         assert system.stop()[0] == 0
@@ -114,9 +107,9 @@ def test_no_external_transition_is_undone(
     lines = system.lines[started:]
     stopping = next(place for place, line in enumerate(lines) if "shutting down:" in line)
     moved = [line for line in lines[:stopping] if "[compose] /" in line]
-    print(f"{count} transitions, {len(failed)} failed, {len(moved)} changes of state")
+    print(f"{TRANSITIONS} transitions, {len(failed)} failed, {len(moved)} changes of state")
     assert not failed
-    assert len(moved) == count, "the supervisor has moved a node"
+    assert len(moved) == TRANSITIONS, "the supervisor has moved a node"
 
 
 def test_a_node_that_was_shut_down_meanwhile_does_not_fail(
