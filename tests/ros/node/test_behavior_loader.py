@@ -15,14 +15,19 @@ from composer.model import BehaviorReference
 from composer.runtime.executors.exceptions import report_of
 from composer.runtime.node.behavior_loader import ParameterValues, behavior_class
 
+SPAN = Span(SourceFile("system.yaml", ""), 1, 1, 1)
+
+
+def reference(name: str, *folders: Path) -> BehaviorReference:
+    """Return a reference to a class in the first folder, or in those of node types."""
+    return BehaviorReference(Located(name, SPAN), folders[0], folders[1:])
+
 
 def test_threads_that_import_a_module_at_the_same_time_share_it(tmp_path: Path) -> None:
     module = "import time\ntime.sleep(0.1)\nclass Late:\n    pass\n"
     tmp_path.joinpath("late.py").write_text(module, encoding="utf-8")
-    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
-    reference = BehaviorReference(Located("late:Late", span), tmp_path)
     with ThreadPoolExecutor(4) as threads:
-        classes = list(threads.map(lambda _: behavior_class(reference), range(4)))
+        classes = list(threads.map(behavior_class, [reference("late:Late", tmp_path)] * 4))
     assert len(set(classes)) == 1
 
 
@@ -44,9 +49,8 @@ def test_parameters_are_read_only_attributes_and_follow_changes() -> None:
 
 def test_a_behavior_does_not_shadow_the_standard_library(tmp_path: Path) -> None:
     tmp_path.joinpath("signal.py").write_text("class Light:\n    pass\n", encoding="utf-8")
-    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
     before = list(sys.path)
-    found = behavior_class(BehaviorReference(Located("signal:Light", span), tmp_path))
+    found = behavior_class(reference("signal:Light", tmp_path))
     assert found.__name__ == "Light"
     assert sys.modules["signal"] is signal
     assert sys.path == before
@@ -59,8 +63,7 @@ def test_an_exception_of_a_behavior_is_reported_under_the_name_of_its_module(
         "class Jam(Exception): ...\nclass Arm:\n    def move(self):\n        raise Jam('wrist')\n"
     )
     tmp_path.joinpath("arm.py").write_text(module, encoding="utf-8")
-    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
-    found = behavior_class(BehaviorReference(Located("arm:Arm", span), tmp_path))
+    found = behavior_class(reference("arm:Arm", tmp_path))
     with pytest.raises(Exception, match="wrist") as caught:
         found().move()
     assert report_of(caught.value).splitlines()[-1] == "arm.Jam: wrist"
@@ -106,10 +109,8 @@ def test_modules_next_to_a_behavior_are_imported_for_it_alone(name: str, tmp_pat
             file = tmp_path / folder / path
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding="utf-8")
-    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
     before = list(sys.path), set(sys.modules) & LOCAL_MODULES
-    reference = BehaviorReference(Located("planner:Planner", span), tmp_path / name)
-    planner = behavior_class(reference)()
+    planner = behavior_class(reference("planner:Planner", tmp_path / name))()
     assert planner.on_tick() == (name, 6, 6, 3, name, name, signal)
     assert (list(sys.path), set(sys.modules) & LOCAL_MODULES) == before
 
@@ -127,23 +128,17 @@ def test_a_behavior_and_its_helpers_share_the_modules_of_the_node_types(tmp_path
     (tmp_path / "systems" / "own.py").write_text(
         "from base import Base\nclass Own(Base):\n    pass\n"
     )
-    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
-
-    def load(text: str) -> type[Any]:
-        return behavior_class(
-            BehaviorReference(Located(text, span), tmp_path / "systems", (nodes,))
-        )
-
-    camera, own = load("drivers.camera:Camera"), load("own:Own")
+    folders = (tmp_path / "systems", nodes)
+    camera: Any = behavior_class(reference("drivers.camera:Camera", *folders))
+    own = behavior_class(reference("own:Own", *folders))
     assert camera.__mro__[1] is own.__mro__[1]
     assert camera.LENS.camera.Camera is camera
 
 
 def test_a_module_that_cannot_be_imported_is_named(tmp_path: Path) -> None:
     (tmp_path / "planner.py").write_text("import nothing_of_that_name\nclass Planner: pass\n")
-    span = Span(SourceFile("system.yaml", ""), 1, 1, 1)
-    reference = BehaviorReference(Located("planner:Planner", span), tmp_path)
+    planner = reference("planner:Planner", tmp_path)
     with pytest.raises(ModuleNotFoundError, match="No module named 'nothing_of_that_name'"):
-        behavior_class(reference)
+        behavior_class(planner)
     (tmp_path / "planner.py").write_text("class Planner: pass\n")
-    assert behavior_class(reference).__name__ == "Planner"
+    assert behavior_class(planner).__name__ == "Planner"

@@ -9,14 +9,16 @@ from typing import Any
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.msg import Parameter, ParameterDescriptor, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
+    GetParameterTypes,
     ListParameters,
     SetParameters,
     SetParametersAtomically,
 )
+from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from type_description_interfaces.srv import GetTypeDescription
 
@@ -27,7 +29,15 @@ from tests.ros.support.in_process import Peer, RunningSystem, running, wait_unti
 
 SYSTEM = """
 system: served
+executors: {events: {kind: events}, multi_threaded: {kind: multi_threaded}}
 nodes:
+  compared_${kind}:
+    for_each: {kind: [events, multi_threaded]}
+    executor: ${kind}
+    parameters:
+      speed: {type: double, default: 1.5, maximum: 5.0}
+      label: {type: string, default: here, read_only: true}
+      arm.joint.count: {type: integer, default: 3}
   subject:
     parameters:
       speed: {type: double, default: 1.5, maximum: 5.0}
@@ -206,8 +216,45 @@ def test_the_manager_node_has_parameter_services(system: RunningSystem, peer: Pe
     assert (value.type, value.bool_value) == (1, False)
 
 
+def plain_node(peer: Peer) -> Node:
+    """Return a node of rclpy with the same parameters."""
+    node = peer.join("plain")
+    node.declare_parameter("speed", 1.5)
+    node.declare_parameter("label", "here", ParameterDescriptor(read_only=True))
+    node.declare_parameter("arm.joint.count", 3)
+    return node
+
+
+REQUESTS: list[tuple[Any, str, dict[str, Any]]] = [
+    (GetParameters, "get_parameters", {"names": ["speed", "arm.joint.count", "speed"]}),
+    (GetParameters, "get_parameters", {"names": ["speed", "missing"]}),
+    (GetParameters, "get_parameters", {"names": []}),
+    (GetParameterTypes, "get_parameter_types", {"names": ["label", "use_sim_time"]}),
+    (GetParameterTypes, "get_parameter_types", {"names": ["missing"]}),
+    (DescribeParameters, "describe_parameters", {"names": ["use_sim_time"]}),
+    (DescribeParameters, "describe_parameters", {"names": ["missing"]}),
+    (ListParameters, "list_parameters", {"prefixes": ["arm", "arm"], "depth": 2}),
+    (ListParameters, "list_parameters", {"prefixes": ["arm"], "depth": 1}),
+    (ListParameters, "list_parameters", {"prefixes": ["missing"]}),
+    (SetParameters, "set_parameters", {"parameters": [change("speed", 3, double_value=2.5)]}),
+    (SetParameters, "set_parameters", {"parameters": [change("missing", 3, double_value=2.5)]}),
+    (SetParameters, "set_parameters", {"parameters": [change("label", 4, string_value="x")]}),
+    (SetParameters, "set_parameters", {"parameters": [change("speed", 2, integer_value=2)]}),
+    (SetParameters, "set_parameters", {"parameters": []}),
+    (
+        SetParametersAtomically,
+        "set_parameters_atomically",
+        {"parameters": [change("speed", 3, double_value=3.5), change("missing", 1)]},
+    ),
+]
+
+
+@pytest.mark.parametrize("node", ["/compared_events", "/compared_multi_threaded"])
 @pytest.mark.usefixtures("system")
-def test_an_integer_for_a_double_is_refused_as_by_rclpy(peer: Peer) -> None:
-    refusal = peer.set_parameter("/subject", "speed", 2)
-    assert "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.INTEGER'" in refusal
-    assert peer.set_parameter("/subject", "speed", 2.0) == ""
+def test_responses_are_those_of_rclpy_on_executors_of_every_kind(peer: Peer, node: str) -> None:
+    plain = plain_node(peer)
+    own = plain.get_fully_qualified_name()
+    for kind, name, fields in REQUESTS:
+        request = kind.Request(**fields)
+        expected = str(peer.call(kind, f"{own}/{name}", request)).replace(own, node)
+        assert str(peer.call(kind, f"{node}/{name}", request)) == expected, (name, fields)
