@@ -79,26 +79,25 @@ def rest_of(process: subprocess.Popen[str]) -> str:
     return output
 
 
-def test_a_start_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
-    hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": "rcl_node_init"}
-    process = start("minimal", "--grace", 1, **hanging)
-    wait_for_line(process, "hanging")
+@pytest.mark.parametrize(
+    ("function", "last_line", "said"),
+    [
+        # The start of a system gets at least 5 s.
+        ("rcl_node_init", "hanging", ("Timeout (0:00:05)!", "manager/node.py")),
+        ("rcl_node_fini", "1 of 1 nodes active", ("Timeout (0:00:01)!", "in destroy_node")),
+    ],
+)
+def test_a_start_or_an_end_that_hangs_in_the_middleware_ends(
+    hanging_rcl: Path, function: str, last_line: str, said: tuple[str, ...]
+) -> None:
+    hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": function}
+    process = start("minimal", "--grace", 1, **hanging)  # the default is 10 s
+    wait_for_line(process, last_line)
     process.send_signal(signal.SIGTERM)
     output = rest_of(process)
     assert process.returncode == 1
-    assert "Timeout (0:00:05)!" in output  # the start of a system gets at least 5 s
-    assert "manager/node.py" in output, "the Python stack"
-
-
-def test_an_end_that_hangs_in_the_middleware_ends(hanging_rcl: Path) -> None:
-    hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": "rcl_node_fini"}
-    process = start("minimal", "--grace", 1, **hanging)
-    wait_for_line(process, "1 of 1 nodes active")
-    process.send_signal(signal.SIGTERM)
-    output = rest_of(process)
-    assert process.returncode == 1
-    assert "Timeout (0:00:01)!" in output  # the default is 10 s
-    assert "in destroy_node" in output
+    for part in said:  # and the Python stack
+        assert part in output
 
 
 def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:

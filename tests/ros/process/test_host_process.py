@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -26,8 +27,9 @@ def compose_run(system: str | Path, *options: str) -> RunningSystem:
     return RunningSystem(str(system), *options, program=COMPOSE)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGHUP])
 def test_a_signal_ends_the_pipeline_in_order(number: signal.Signals) -> None:
+    """SIGINT and SIGTERM are in test_signals.py."""
     with compose_run(PIPELINE) as run:
         run.wait_for("3 of 3 nodes active")
         code, took_s = run.stop(number)
@@ -161,3 +163,38 @@ def test_node_logs_reach_the_terminal_at_their_level_and_threads_take_turns_soon
     assert "] [WARN] [robot.loud] a warning\n" in run.output
     assert "] [DEBUG] [robot.loud] a debug line\n" in run.output
     assert "] threads take turns after 0.001 s\n" in run.output
+
+
+LOAD = """
+import sys
+from composer.runtime.process.libraries import loading_libraries
+with loading_libraries():
+    pass
+assert "rclpy" not in sys.modules
+with open("/proc/self/maps") as maps:
+    print("librcl.so" in maps.read())
+"""
+TYPE_SUPPORT = """
+import sys
+from composer.runtime.ros.messages import interface_class
+interface_class("std_msgs/msg/String")
+print("lark" in sys.modules, "rosidl_generator_py" in sys.modules)
+import rosidl_generator_py.generate_py_impl
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "middleware", "printed"),
+    [
+        pytest.param(LOAD, "", "True", id="libraries are loaded before rclpy is imported"),
+        pytest.param(LOAD, "rmw_nothing", "False", id="nothing that may end the process"),
+        pytest.param(TYPE_SUPPORT, "", "False True", id="not the generator of message classes"),
+    ],
+)
+def test_what_a_process_loads_of_ros(
+    program: str, middleware: str, printed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RMW_IMPLEMENTATION", middleware)
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == printed

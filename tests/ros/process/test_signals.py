@@ -7,11 +7,11 @@ import random
 import re
 import signal
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from tests.ros.process.test_restarts import children
 from tests.ros.support.in_process import end_limit_s
 from tests.ros.support.system_process import RunningSystem
 
@@ -29,7 +29,7 @@ def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
     with RunningSystem("systems/pipeline.yaml", "--for", "30") as system:
         system.wait_for(moment)
         time.sleep(delay_s)
-        children = children_of(system.process.pid)
+        _, *left = children(system.process.pid)
         sent_s = time.monotonic()
         os.kill(system.process.pid, number)
         code = system.process.wait(timeout=60.0)
@@ -40,7 +40,7 @@ def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
     assert "Traceback" not in system.output, case
     for state in ("inactive", "unconfigured", "finalized"):
         check_order(system.lines, state, case)
-    assert not [number for number in children.split() if Path("/proc", number).exists()], case
+    assert not [pid for pid in left if Path("/proc", str(pid)).exists()], case
     return took_s
 
 
@@ -53,15 +53,6 @@ def check_order(lines: list[str], state: str, case: str) -> None:
     assert down == [node for node in ORDER if node in down], case
     if state == "finalized":
         assert len(down) == len(ORDER), case
-
-
-def children_of(pid: int) -> str:
-    """Return the child processes of a process."""
-    children = ""
-    for task in Path("/proc", str(pid), "task").iterdir():
-        with suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
-            children += task.joinpath("children").read_text()
-    return children
 
 
 @pytest.mark.parametrize(
