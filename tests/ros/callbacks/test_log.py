@@ -23,35 +23,31 @@ nodes:
     on_configure: {log: {level: debug, message: "a detail of {node}"}}
     on_activate: {log: {level: warn, message: "a warning"}}
 """
+HERE = "  here: {behavior: here:Here}\n"
+HERE_MODULE = """
+from composer.behavior import Behavior
+
+class Here(Behavior):
+    def on_activate(self):
+        self.log.info("here")
+"""
 
 
 def test_a_late_subscription_of_rosout_receives_the_log(tmp_path: Path, peer: Peer) -> None:
     late = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    with running(LOUD, tmp_path, options=HostOptions(log_level=LogLevel.DEBUG)):
+    options = HostOptions(log_level=LogLevel.DEBUG)
+    with running(LOUD + HERE, tmp_path, options=options, here=HERE_MODULE):
         messages = peer.listen(Log, "/rosout", late)
         wait_until(lambda: sum(message.name == "robot.loud" for message in messages) == 2)
+        line = wait_until(lambda: next((item for item in messages if item.msg == "here"), None))
     lines = [message for message in messages if message.name == "robot.loud"]
     assert [(line.level, line.msg) for line in lines] == [
         (Log.DEBUG, "a detail of /robot/loud"),
         (Log.WARN, "a warning"),
     ]
     assert lines[0].stamp.sec > 0
-
-
-def test_rosout_says_where_a_behavior_has_logged(tmp_path: Path, peer: Peer) -> None:
-    text = "system: loud\nnodes: {loud: {behavior: loud:Loud}}"
-    module = """
-    from composer.behavior import Behavior
-
-    class Loud(Behavior):
-        def on_activate(self):
-            self.log.info("here")
-    """
-    late = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    with running(text, tmp_path, loud=module):
-        messages = peer.listen(Log, "/rosout", late)
-        line = wait_until(lambda: next((item for item in messages if item.msg == "here"), None))
-    assert (line.file, line.function, line.line) == (str(tmp_path / "loud.py"), "on_activate", 6)
+    # Where a behavior has logged:
+    assert (line.file, line.function, line.line) == (str(tmp_path / "here.py"), "on_activate", 6)
 
 
 def test_messages_below_the_level_are_not_logged(tmp_path: Path) -> None:
