@@ -128,11 +128,22 @@ nodes:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_coroutine_sleeps_in_simulated_time(tmp_path: Path, peer: Peer, kind: str) -> None:
+def test_a_coroutine_sleeps_in_simulated_time_until_deactivation(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
     with running(SLEEPING.format(kind=kind), tmp_path, sleeper=SLEEPER) as system:
-        simulator = Simulator(peer, system)
-        simulator.set_time(50.0)
         go = peer.publisher(String, "/go")
+        go.publish(String())  # before the first time
+        system.wait_for_log("asleep 0.0")
+        let_real_time_pass(system)
+        simulator = Simulator(peer, system)
+        simulator.set_time(40.0)
+        assert peer.change("/a", "deactivate")
+        system.wait_for_log("woken")
+        simulator.set_time(50.0)
+        assert peer.change("/a", "activate")
+        let_real_time_pass(system)
+        assert "awake" not in system.log_text()
         go.publish(String())
         system.wait_for_log("asleep 50.0")
         let_real_time_pass(system)
@@ -149,22 +160,6 @@ def test_a_coroutine_sleeps_in_simulated_time(tmp_path: Path, peer: Peer, kind: 
         assert system.log_text().count("awake") == 1
         simulator.set_time(15.0)
         system.wait_for_log("awake 15.0")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_deactivation_ends_a_sleep(tmp_path: Path, peer: Peer, kind: str) -> None:
-    with running(SLEEPING.format(kind=kind), tmp_path, sleeper=SLEEPER) as system:
-        peer.publisher(String, "/go").publish(String())  # before the first time
-        system.wait_for_log("asleep 0.0")
-        let_real_time_pass(system)
-        simulator = Simulator(peer, system)
-        simulator.set_time(50.0)
-        assert peer.change("/a", "deactivate")
-        system.wait_for_log("woken")
-        simulator.set_time(60.0)
-        assert peer.change("/a", "activate")
-        let_real_time_pass(system)
-        assert "awake" not in system.log_text()
         assert system.reported(CallbackFailed) == []
 
 

@@ -68,25 +68,28 @@ def test_multiples_of_a_period_are_met_exactly(bench: Bench) -> None:
     assert len(bench.called) == 10_000
 
 
-def test_a_jump_forward_calls_once_and_keeps_the_phase(bench: Bench) -> None:
-    bench.pass_to(10.0)
+JUMPS = [
+    pytest.param(10.0, (110.5, 110.9, 111.0), [110.5, 111.0], id="forward: one call in phase"),
+    pytest.param(100.0, (100.9, 100.5, 100.9, 100.6, 101.0), [101.0], id="a little backward"),
+    pytest.param(100.0, (7.0, 7.9, 8.0, 9.0), [8.0, 9.0], id="backward: a period from there"),
+]
+
+
+@pytest.mark.parametrize(("start_s", "times_s", "called_s"), JUMPS)
+def test_a_timer_follows_jumps(
+    bench: Bench, start_s: float, times_s: tuple[float, ...], called_s: list[float]
+) -> None:
+    bench.pass_to(start_s)
     bench.calls.add(1.0, bench.note, repeats=True)
-    assert bench.pass_to(110.5, 110.9, 111.0) == [110.5, 111.0]
+    assert bench.pass_to(*times_s) == called_s
 
 
-def test_a_jump_backward_waits_no_longer_than_a_period(bench: Bench) -> None:
+def test_a_call_waits_its_delay_again_after_a_jump_backward(bench: Bench) -> None:
     bench.pass_to(100.0)
     bench.calls.add(1.0, bench.note, repeats=True)
     bench.calls.add(5.0, bench.note)
-    assert bench.pass_to(7.0, 7.9, 8.0, 9.0) == [8.0, 9.0]
-    assert bench.pass_to(11.9) == [11.9]
+    assert bench.pass_to(7.0, 9.0, 11.9) == [9.0, 11.9]
     assert bench.pass_to(12.0) == [12.0, 12.0]
-
-
-def test_a_small_jump_backward_shifts_nothing(bench: Bench) -> None:
-    bench.pass_to(100.0)
-    bench.calls.add(1.0, bench.note, repeats=True)
-    assert bench.pass_to(100.9, 100.5, 100.9, 100.6, 101.0) == [101.0]
 
 
 def test_a_pending_call_restarts_when_time_jumps_back(bench: Bench) -> None:
@@ -172,12 +175,17 @@ def test_lateness_is_in_simulated_time(bench: Bench) -> None:
     assert late_s == [0.25]
 
 
-@pytest.mark.parametrize("period_s", [0.0, -1.0, math.nan])
-def test_a_period_must_be_positive(bench: Bench, period_s: float) -> None:
-    with pytest.raises(ValueError, match="a period must be positive"):
-        bench.calls.add(period_s, bench.note, repeats=True)
-
-
-def test_a_delay_must_be_a_number(bench: Bench) -> None:
-    with pytest.raises(ValueError, match="must be a number"):
-        bench.calls.add(math.nan, bench.note)
+@pytest.mark.parametrize(
+    ("delay_s", "repeats", "message"),
+    [
+        (0.0, True, "a period must be positive"),
+        (-1.0, True, "a period must be positive"),
+        (math.nan, True, "a period must be positive"),
+        (math.nan, False, "must be a number"),
+    ],
+)
+def test_a_period_must_be_positive_and_a_delay_a_number(
+    bench: Bench, delay_s: float, repeats: bool, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        bench.calls.add(delay_s, bench.note, repeats=repeats)

@@ -93,6 +93,14 @@ class Recorder(Behavior):
 """
 
 
+def written(folder: Path, system: str, parts: str) -> Path:
+    """Write a system and its behaviors; return the path of the system."""
+    folder.joinpath("parts.py").write_text(parts, encoding="utf-8")
+    path = folder / "system.yaml"
+    path.write_text(system, encoding="utf-8")
+    return path
+
+
 def run(system: Path, hash_seed: str, *options: str) -> tuple[str, str]:
     """Run a system for 20 s of virtual time, in a new interpreter; return what it prints."""
     command = (*COMPOSE, "run", str(system), "--time", "virtual", "--for", "20", *options)
@@ -104,9 +112,7 @@ def run(system: Path, hash_seed: str, *options: str) -> tuple[str, str]:
 
 
 def test_the_same_run_byte_by_byte_whatever_the_hash_seed(tmp_path: Path) -> None:
-    system = tmp_path / "recorded.yaml"
-    system.write_text(SYSTEM)
-    (tmp_path / "parts.py").write_text(PARTS)
+    system = written(tmp_path, SYSTEM, PARTS)
     first = run(system, "0")
     log = first[1]
     assert log.count("[recorder] 0001") > 280
@@ -218,9 +224,7 @@ WARNED = [
 
 
 def test_deadlines_leases_and_lifespans_are_those_of_virtual_time(tmp_path: Path) -> None:
-    system = tmp_path / "timed.yaml"
-    system.write_text(TIMED)
-    (tmp_path / "parts.py").write_text(LATE)
+    system = written(tmp_path, TIMED, LATE)
     log = run(system, "0")[1].splitlines()
     assert [line for line in log if "[WARN]" in line and "[late]" not in line] == WARNED
     maps = [line for line in log if line.endswith("[late] a map")]
@@ -255,9 +259,7 @@ class Endless(Behavior):
 
 @pytest.mark.parametrize(("nodes", "reason"), ENDLESS)
 def test_a_system_whose_time_does_not_advance_ends(tmp_path: Path, nodes: str, reason: str) -> None:
-    system = tmp_path / "endless.yaml"
-    system.write_text(f"system: endless\nnodes: {nodes}\n")
-    (tmp_path / "parts.py").write_text(PART_WITHOUT_END)
+    system = written(tmp_path, f"system: endless\nnodes: {nodes}\n", PART_WITHOUT_END)
     done = compose("run", str(system), "--time", "virtual", "--for", "60")
     assert done.returncode == 1
     assert re.search(rf"ran for 1.0 s: the time does not advance, {reason}", done.stderr)
@@ -275,10 +277,8 @@ class Hangs(Behavior):
 
 
 def test_a_callback_that_does_not_return_is_interrupted_at_the_end(tmp_path: Path) -> None:
-    system = tmp_path / "hangs.yaml"
     node = "{behavior: parts:Hangs, timers: {start: {period_ms: 1000}}}"
-    system.write_text(f"system: hangs\nnodes: {{x: {node}}}\n")
-    (tmp_path / "parts.py").write_text(HANGS)
+    system = written(tmp_path, f"system: hangs\nnodes: {{x: {node}}}\n", HANGS)
     with RunningSystem(str(system), "--time", "virtual", "--for", "5") as running:
         running.wait_for("it hangs")
         assert running.stop()[0] == 0
@@ -315,9 +315,7 @@ NOTICED = (
 
 
 def test_what_virtual_time_does_not_control_is_named_once(tmp_path: Path) -> None:
-    system = tmp_path / "outside.yaml"
-    system.write_text("system: outside\nnodes: {x: {behavior: parts:Outside}}\n")
-    (tmp_path / "parts.py").write_text(OUTSIDE)
+    system = written(tmp_path, "system: outside\nnodes: {x: {behavior: parts:Outside}}\n", OUTSIDE)
     log = run(system, "0")[1]
     uses = re.findall(r"parts.py:(\d+) uses (.*), which virtual time does not control; use", log)
     assert uses == [(str(line), name) for line, name in enumerate(NOTICED, 10)]
