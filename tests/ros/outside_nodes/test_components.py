@@ -107,43 +107,45 @@ def test_load_unload_crash_and_reload(rounds: int, tmp_path: Path, peer: Peer) -
         assert "has ended" in failures(system, "/robot/left/talker")[0].reason
 
 
-@pytest.mark.parametrize(
-    ("component", "more", "reason"),
-    [
-        ('plugin: "demo::Broken"', "", "cannot load it: Component constructor threw an exception"),
-        ('plugin: "demo::Verbose"', "", "threw an exception: no camera"),
-        ('plugin: "demo::Talkr"', "", "Failed to find class with the requested plugin name"),
-        ('plugin: "demo::Stubborn"', "", "has given it the name /talker"),
-        (
-            'plugin: "demo::Camera", lifecycle: managed',
-            "parameters: {refuse: configure}",
-            "its service reports a failure",
-        ),
-        ('plugin: "demo::Talker", lifecycle: managed', "", "no service /robot/odd/change_state"),
-        (
-            'plugin: "demo::Talker"',
-            "services: {reset: {type: std_srvs/srv/Trigger, external: true}}",
-            "it has no service /robot/reset after 5 s",
-        ),
-    ],
+#: Components, what else their nodes have, and why they fail; ODD is the name of the node.
+ODD = (
+    ('plugin: "demo::Broken"', "", "cannot load it: Component constructor threw an exception"),
+    ('plugin: "demo::Verbose"', "", "threw an exception: no camera"),
+    ('plugin: "demo::Talkr"', "", "Failed to find class with the requested plugin name"),
+    ('plugin: "demo::Stubborn"', "", "has given it the name /talker"),
+    (
+        'plugin: "demo::Camera", lifecycle: managed',
+        "parameters: {refuse: configure}",
+        "its service reports a failure",
+    ),
+    ('plugin: "demo::Talker", lifecycle: managed', "", "no service /robot/ODD/change_state"),
+    (
+        'plugin: "demo::Talker"',
+        "services: {reset: {type: std_srvs/srv/Trigger, external: true}}",
+        "it has no service /robot/reset after 5 s",
+    ),
 )
-def test_a_failed_load_says_why_and_leaves_nothing(
-    component: str, more: str, reason: str, tmp_path: Path, peer: Peer
-) -> None:
-    odd = f"""
-  odd:
+
+
+def test_failed_loads_say_why_and_leave_nothing(tmp_path: Path, peer: Peer) -> None:
+    nodes = [
+        f"""
+  odd_{number}:
     required: false
     component: {{package: demo, {component}, ready_timeout_ms: 5000}}
     container: container
     {more}
 """
-    with running(robot(odd), tmp_path) as system:
-        failed = wait_until(lambda: failures(system, "/robot/odd"), "its fault")[0]
-        assert reason in failed.reason
-        assert len(failed.reason) < LONG
-        wait_until(lambda: system.node("odd").state == "unconfigured", "its state")
-        is_kept = "reports a failure" in reason  # for the next attempt, as a process is
-        assert loaded(peer) == ["/robot/odd"] * is_kept
+        for number, (component, more, _) in enumerate(ODD)
+    ]
+    with running(robot(*nodes), tmp_path) as system:
+        for number, (_, _, reason) in enumerate(ODD):
+            name = f"odd_{number}"
+            failed = system.wait_for_failure(f"/robot/{name}")
+            assert reason.replace("ODD", name) in failed.reason
+            assert len(failed.reason) < LONG
+            wait_until(lambda name=name: system.node(name).state == "unconfigured", name)
+        assert loaded(peer) == ["/robot/odd_4"]  # for the next attempt, as a process is
 
 
 def test_a_node_that_does_not_load_components(tmp_path: Path) -> None:
@@ -158,11 +160,6 @@ def test_a_node_that_does_not_load_components(tmp_path: Path) -> None:
         assert (
             "/robot/container has no service /robot/container/_container/load_node" in failed.reason
         )
-
-
-def test_slow_constructor_is_loaded_once(tmp_path: Path, peer: Peer) -> None:
-    with running(robot(TALKER.replace("demo::Talker", "demo::Slow")), tmp_path):
-        assert loaded(peer) == ["/robot/left/talker"]
 
 
 def test_a_container_may_be_slow_with_more_components_than_its_services_queue(

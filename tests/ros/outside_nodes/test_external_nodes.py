@@ -6,25 +6,18 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 from lifecycle_msgs.srv import GetState
 
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.other_instances import Instance
-from composer.runtime.supervision.events import (
-    BroughtUp,
-    NodeFailed,
-    RollingBack,
-)
+from composer.runtime.supervision.events import BroughtUp, NodeFailed, RollingBack
 from tests.ros.support.external_processes import soon_missed
-from tests.ros.support.in_process import (
-    Peer,
-    running,
-    wait_until,
-)
+from tests.ros.support.in_process import Peer, running, wait_until
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
 
@@ -42,24 +35,37 @@ nodes:
 """
 
 
-def test_an_external_node_is_awaited_and_observed(tmp_path: Path) -> None:
-    process = start_external(tmp_path)
+@contextmanager
+def external_lidar(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Run the external node for the length of the block."""
+    names = ("-r", "__node:=lidar", "-r", "words:=scan", "-p", "rate:=20.0")
+    process = subprocess.Popen(
+        [sys.executable, PROGRAMS / "driver.py", "--ros-args", *names],
+        env={**os.environ, **soon_missed(folder)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
-        with running(EXTERNAL.replace("TIMEOUT", "20000"), tmp_path) as system:
-            assert system.states()[-2:] == ["/lidar active", "/filter active"]
-            system.wait_for_log("tick")
-            process.send_signal(signal.SIGINT)
-            process.wait(60)
-            failed = system.wait_for_failure("/lidar")
-            assert failed.reason == "it has disappeared from the ROS graph"
-            wait_until(lambda: system.node("filter").state == "inactive", "the pause")
-            process = start_external(tmp_path)
-            wait_until(lambda: system.node("filter").state == "active", "the return")
-            system.stop()
-            assert process.poll() is None  # never ended by the system
+        yield process
     finally:
         process.kill()
         process.wait()
+
+
+def test_an_external_node_is_awaited_and_observed(tmp_path: Path) -> None:
+    text = EXTERNAL.replace("TIMEOUT", "20000")
+    with external_lidar(tmp_path) as process, running(text, tmp_path) as system:
+        assert system.states()[-2:] == ["/lidar active", "/filter active"]
+        system.wait_for_log("tick")
+        process.send_signal(signal.SIGINT)
+        process.wait(60)
+        failed = system.wait_for_failure("/lidar")
+        assert failed.reason == "it has disappeared from the ROS graph"
+        wait_until(lambda: system.node("filter").state == "inactive", "the pause")
+        with external_lidar(tmp_path) as next_process:
+            wait_until(lambda: system.node("filter").state == "active", "the return")
+            system.stop()
+            assert next_process.poll() is None  # never ended by the system
 
 
 @pytest.mark.parametrize("is_required", [True, False])
@@ -69,29 +75,20 @@ def test_a_system_is_up_without_an_external_node_and_takes_it_in_later(
     text = EXTERNAL.replace("TIMEOUT", "300") + "  other: {}\n"
     if not is_required:
         text = text.replace("  lidar:\n", "  lidar:\n    required: false\n")
-    process = None
-    try:
-        with running(text, tmp_path) as system:
-            (up,) = system.reported(BroughtUp)
-            assert str(up).startswith("1 of 3 nodes active after ")
-            assert str(up).endswith(" s, waiting for /lidar")
-            assert up.is_complete is not is_required
-            failed = system.wait_for_failure("/lidar")
-            missing = "it has no publisher /scan, service /reset after 0.3 s"
-            assert failed.reason.startswith(f"activate failed: {missing}")
-            assert failed.is_tolerated is not is_required
-            assert [system.node(name).state for name in ("other", "filter")] == [
-                "active",
-                "inactive",
-            ]
-            process = start_external(tmp_path)
+    with running(text, tmp_path) as system:
+        (up,) = system.reported(BroughtUp)
+        assert str(up).startswith("1 of 3 nodes active after ")
+        assert str(up).endswith(" s, waiting for /lidar")
+        assert up.is_complete is not is_required
+        failed = system.wait_for_failure("/lidar")
+        missing = "it has no publisher /scan, service /reset after 0.3 s"
+        assert failed.reason.startswith(f"activate failed: {missing}")
+        assert failed.is_tolerated is not is_required
+        assert [system.node(name).state for name in ("other", "filter")] == ["active", "inactive"]
+        with external_lidar(tmp_path):
             wait_until(lambda: system.node("filter").state == "active", "the arrival")
             assert system.reported(NodeFailed) == [failed]
             assert system.stop().exit_code == 0
-    finally:
-        if process is not None:
-            process.kill()
-            process.wait()
 
 
 def test_the_end_does_not_wait_for_an_absent_node(tmp_path: Path) -> None:
@@ -149,13 +146,3 @@ def test_a_refused_system_leaves_an_external_node_as_it_is(tmp_path: Path, peer:
                 assert peer.call(GetState, state).current_state.label == "active"
         finally:
             process.kill()
-
-
-def start_external(folder: Path) -> subprocess.Popen[Any]:
-    names = ("-r", "__node:=lidar", "-r", "words:=scan", "-p", "rate:=20.0")
-    return subprocess.Popen(
-        [sys.executable, PROGRAMS / "driver.py", "--ros-args", *names],
-        env={**os.environ, **soon_missed(folder)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
