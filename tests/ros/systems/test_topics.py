@@ -43,6 +43,10 @@ def test_a_late_joiner_receives_the_state_but_no_old_scans(external: ExternalNod
         external.wait_for_state("/robot", "active")
         system.wait_for(r"early_listener.*mode is ready")
         system.wait_for(r"early_listener.*order 1$")
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        received = external.listen(String, "/mode", latched)
+        external.spin_until(lambda: len(received) == 1)
+        assert received[0].data == "ready"
         assert external.state("/late_joiner") == "unconfigured"
         assert external.change_state("/late_joiner", "configure")
         assert external.change_state("/late_joiner", "activate")
@@ -51,15 +55,6 @@ def test_a_late_joiner_receives_the_state_but_no_old_scans(external: ExternalNod
         # A best-effort subscription is compatible with a reliable publisher.
         system.wait_for(r"late_joiner.*order \d+")
     assert int(re.findall(r"scan (\d+)", first)[0]) > 5
-
-
-def test_an_external_late_joiner_receives_the_state(external: ExternalNode) -> None:
-    with RunningSystem("systems/qos_patterns.yaml") as system:
-        system.wait_for(r"early_listener.*order 1$")
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        received = external.listen(String, "/mode", latched)
-        external.spin_until(lambda: len(received) == 1)
-        assert received[0].data == "ready"
 
 
 def test_control_stays_on_one_thread_and_perception_uses_several(external: ExternalNode) -> None:
