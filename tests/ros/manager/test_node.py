@@ -153,35 +153,31 @@ def test_finalized_nodes_are_created_again(tmp_path: Path, peer: Peer) -> None:
         assert peer.change("/fleet/planner", "deactivate")
 
 
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ("configure", "/fleet/planner: configure failed: ValueError: no map"),
-        ("refuse activate", "/fleet/planner: activate failed: not now"),
-    ],
+FAULTS = (
+    ("configure", "/fleet/planner: configure failed: ValueError: no map"),
+    ("refuse activate", "/fleet/planner: activate failed: not now"),
 )
-def test_a_failed_start_is_rolled_back_and_can_be_retried(
-    tmp_path: Path, peer: Peer, fault: str, words: str
-) -> None:
+
+
+def test_a_failed_start_is_rolled_back_and_can_be_retried(tmp_path: Path, peer: Peer) -> None:
     with running(ROBOT, tmp_path, autostart=PrimaryState.UNCONFIGURED, planner=PLANNER) as system:
-        assert peer.set_parameter("/fleet/planner", "fault", fault) == ""
-        success, message = command(peer, "startup_all_or_nothing")
-        assert not success
-        assert message.startswith(words)
-        assert message.endswith("0 of 3 nodes active")
-        for node in ("planner", "motor", "camera"):
-            assert peer.state(f"/fleet/{node}") == "unconfigured"
+        for fault, words in FAULTS:
+            assert peer.set_parameter("/fleet/planner", "fault", fault) == ""
+            success, message = command(peer, "startup_all_or_nothing")
+            assert not success
+            assert message.startswith(words)
+            assert message.endswith("0 of 3 nodes active")
+            for node in ("planner", "motor", "camera"):
+                assert peer.state(f"/fleet/{node}") == "unconfigured"
         assert peer.set_parameter("/fleet/planner", "fault", "") == ""
         assert command(peer, "startup") == (True, "2 of 3 nodes active")
-        assert system.stop().exit_code == 0
-
-
-def test_a_failed_pause_is_reported(tmp_path: Path, peer: Peer) -> None:
-    with running(ROBOT, tmp_path, planner=PLANNER):
+        # A failed pause is reported as well.
         assert peer.set_parameter("/fleet/planner", "fault", "refuse deactivate") == ""
         success, message = command(peer, "pause")
         assert not success
         assert "/fleet/planner: deactivate failed: not now" in message
+        assert peer.set_parameter("/fleet/planner", "fault", "") == ""
+        assert system.stop().exit_code == 0
 
 
 def test_states_are_published_latched_on_change_and_every_second(

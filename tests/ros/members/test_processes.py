@@ -16,7 +16,7 @@ from composer.runtime.supervision.events import (
     Restarted,
     RollingBack,
 )
-from tests.ros.members.split_robot import TEXT, alive, pid_of, split, states
+from tests.ros.members.split_robot import TEXT, alive, pid_of, split
 from tests.ros.support.in_process import Peer, RunningSystem, wait_until
 
 TOGETHER = """
@@ -164,26 +164,3 @@ def test_errors_in_another_process_fail_the_run(tmp_path: Path) -> None:
     assert summaries["/lab/detector"].received > 0
     assert summaries["/lab/camera"].errors == 0
     assert summaries["/lab/camera"].sent >= summaries["/lab/detector"].received
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(1800)
-def test_any_process_is_killed_fifty_times(tmp_path: Path) -> None:
-    """Recovery by policy; nothing is left, and nothing runs twice."""
-    text = TEXT.replace("max_attempts: 5", "max_attempts: 1000")
-    text = text.replace("backoff_ms: 100}", "backoff_ms: 100, max_attempts: 1000}")
-    pids: set[int] = set()
-    with split(tmp_path, text) as system:
-        for round_ in range(50):
-            name = ("camera", "detector")[round_ % 2]
-            pid = pid_of(system, name)
-            pids |= {pid_of(system, "camera"), pid_of(system, "detector")}
-            os.kill(pid, signal.SIGKILL)
-            count = round_ + 1
-            wait_until(lambda n=count: len(system.reported(Restarted)) >= n, "the restart")
-            wait_until(lambda: states(system) == {"active"}, f"all nodes in round {count}")
-            running_now = {pid_of(system, "camera"), pid_of(system, "detector")}
-            pids |= running_now
-            wait_until(lambda now=running_now, known=pids: all_alive(known) == now, "no double")
-        assert system.stop().exit_code == 0
-    wait_until(lambda: not all_alive(pids), "the end of the processes")
