@@ -1,4 +1,4 @@
-"""Template values become ROS messages, or an error that names the field."""
+"""Template values become ROS messages, or an error that names the field; rates of messages."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from sensor_msgs.msg import BatteryState, Image, JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Bool, Byte, Float64, Header, Int8, String, UInt64
 
+from composer.client.messages.topics import RateWindow
 from composer.client.messages.values import InvalidValueError, build_message
 from composer.language.document import parse_bytes
 from composer.language.templates import Template, compile_template
@@ -178,3 +179,47 @@ def test_only_packages_in_the_ament_index_are_imported(
         with pytest.raises(MessageError):
             interface_class(name)
     assert not imported.exists()
+
+
+def test_rate_statistics() -> None:
+    window = RateWindow(100)
+    for at_s in (10.0, 10.1, 10.2, 10.5):
+        window.add(at_s)
+    rate = window.statistics()
+    assert rate is not None
+    assert rate.average_hz == pytest.approx(3 / 0.5)
+    assert (rate.shortest_s, rate.longest_s) == (pytest.approx(0.1), pytest.approx(0.3))
+    assert rate.deviation_s == pytest.approx(0.0942809)
+    assert rate.window == 3
+
+
+def test_a_window_keeps_the_last_messages_and_too_few_have_no_statistics() -> None:
+    window = RateWindow(2)
+    assert window.statistics() is None
+    window.add(0.0)
+    assert window.statistics() is None
+    for at_s in (100.0, 100.5, 101.0):
+        window.add(at_s)
+    rate = window.statistics()
+    assert rate is not None
+    assert (rate.average_hz, rate.window) == (2.0, 2)
+
+
+@pytest.mark.parametrize("size", [1, 4, 7, 100])
+def test_bursts_have_the_rate_of_their_messages(size: int) -> None:
+    window = RateWindow(size)
+    for second in range(12):
+        for at_s in (second, second + 0.0004):
+            window.add(at_s)
+            rate = window.statistics()
+            assert (rate is None) == (second == 0)
+            assert rate is None or rate.average_hz == pytest.approx(2.0)
+
+
+def test_a_fast_topic_has_its_rate_with_a_small_window() -> None:
+    window = RateWindow(3)
+    for number in range(1000):
+        window.add(number / 1000)
+    rate = window.statistics()
+    assert rate is not None
+    assert (rate.average_hz, rate.window) == (pytest.approx(1000.0, rel=0.02), 3)
