@@ -98,13 +98,10 @@ def test_nodes_start_without_one_whose_failure_is_ignored(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("policy", "together"),
-    [("shutdown", False), ("restart, restart: {max_attempts: 1, then: shutdown}", False),
-     ("isolate", True)],
-)  # fmt: skip
-def test_a_bring_up_is_rolled_back(tmp_path: Path, policy: str, together: bool) -> None:
-    options = HostOptions(all_or_nothing=together)
-    with running(robot(policy), tmp_path, options=options, driver=DRIVER) as system:
+    "policy", ["shutdown", "restart, restart: {max_attempts: 1, then: shutdown}"]
+)
+def test_a_bring_up_is_rolled_back(tmp_path: Path, policy: str) -> None:
+    with running(robot(policy), tmp_path, driver=DRIVER) as system:
         outcome = system.end()
     assert outcome.exit_code == 1
     assert outcome.reason.startswith("/driver failed")
