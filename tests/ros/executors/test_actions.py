@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -18,13 +17,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from composer.runtime.executors import actions
 from composer.runtime.executors.tasks import sleep
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, peer, wait_for_line
-
-
-@pytest.fixture(params=KINDS)
-def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with bench(request.param) as running:
-        yield running
+from tests.ros.support.loops import Bench, peer, wait_for_line
 
 
 class serving:  # noqa: N801

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -15,12 +14,6 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.loops import KINDS, Bench, bench, loop_of
-
-
-@pytest.fixture(params=KINDS)
-def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with bench(request.param) as running:
-        yield running
 
 
 def test_calls_of_each_thread_all_start_and_keep_their_order(on: Bench) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -13,15 +12,9 @@ from std_srvs.srv import Trigger
 from composer.runtime.executors.futures import wrap_future
 from composer.runtime.executors.tasks import sleep, within
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer
+from tests.ros.support.loops import Bench, last_line, peer
 
 ERRORS = (ValueError, SystemExit, KeyboardInterrupt)
-
-
-@pytest.fixture(params=KINDS)
-def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with bench(request.param) as running:
-        yield running
 
 
 def call(on: Bench, client: Any, request: Any) -> Any:

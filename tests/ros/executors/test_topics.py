@@ -4,20 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 
-import pytest
 from rclpy.qos import HistoryPolicy
 from std_msgs.msg import Int64
 
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.loops import KINDS, Bench, bench, last_line, peer
-
-
-@pytest.fixture(params=KINDS)
-def on(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with bench(request.param) as running:
-        yield running
+from tests.ros.support.loops import Bench, last_line, peer
 
 
 def test_messages_from_before_the_subscription_was_added_are_served(on: Bench) -> None:

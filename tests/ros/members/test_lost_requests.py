@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -75,54 +74,40 @@ def test_a_request_that_a_full_queue_has_dropped_is_sent_again(tmp_path: Path, p
         assert not system.reported(NodeFailed)
 
 
-@pytest.fixture
-def member(tmp_path: Path, peer: Peer) -> Iterator[list[String]]:
-    """The reports of a process that runs on its own."""
+def test_a_step_that_arrives_twice_or_too_late_is_not_run(tmp_path: Path, peer: Peer) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(TEXT, encoding="utf-8")
     tmp_path.joinpath("busy.py").write_text(BUSY, encoding="utf-8")
     process = subprocess.Popen([*command_of(path), "--process", "other"], stderr=subprocess.DEVNULL)
     try:
-        reports = peer.listen(String, STATE, STATE_QOS)
-        wait_until(lambda: reports and last(reports).activity == "running", "its nodes")
-        yield reports
+        member = peer.listen(String, STATE, STATE_QOS)
+        wait_until(lambda: member and last(member).activity == "running", "its nodes")
+        moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
+        seen = last(member).number
+        configure = Step(1, "configure", "/lab/camera")
+        request = ChangeStates("", "peer", seen, (configure,))
+        calls = [peer.begin(RequestService, SERVICE, request_message(request)) for _ in range(2)]
+        first, second = (read_answer(finished(call), request).results for call in calls)
+        assert first[0].success
+        assert first == second
+        (unknown,) = results(peer, seen, Step(2, "configure", "/lab/arm"))
+        assert unknown.reason == "the process has no such node"
+        activated, outdated = results(peer, seen, Step(3, "activate", "/lab/camera"), configure)
+        assert activated.success
+        assert outdated.reason == "a later request was received before"
+
+        # The sender of a late one does not wait any more: it has seen no report for longer.
+        wait_until(lambda: last(member).number > seen + 10, "reports of ten seconds")
+        for step in (Step(4, "shutdown", "/lab/camera"), Step(5, "deactivate", "/lab/camera")):
+            late = ChangeStates("", "peer", seen, (step,))
+            peer.client(RequestService, SERVICE).call_async(request_message(late))
+        (result,) = results(peer, last(member).number, Step(6, "cleanup", "/lab/camera"))
+        assert "the node is active" in result.reason  # requests arrive in order
+        wait_until(lambda: len(moves) >= 4, "the transitions")
+        assert labels(moves) == ["configuring", "inactive", "activating", "active"]
     finally:
         process.terminate()
         assert process.wait(60.0) == 0
-
-
-def test_a_step_that_arrives_twice_is_run_once(member: list[String], peer: Peer) -> None:
-    moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
-    seen = last(member).number
-    configure = Step(1, "configure", "/lab/camera")
-    request = ChangeStates("", "peer", seen, (configure,))
-    calls = [peer.begin(RequestService, SERVICE, request_message(request)) for _ in range(2)]
-    first, second = (read_answer(finished(call), request).results for call in calls)
-    assert first[0].success
-    assert first == second
-    (unknown,) = results(peer, seen, Step(2, "configure", "/lab/arm"))
-    assert unknown.reason == "the process has no such node"
-    activated, outdated = results(peer, seen, Step(3, "activate", "/lab/camera"), configure)
-    assert activated.success
-    assert outdated.reason == "a later request was received before"
-    wait_until(lambda: len(moves) >= 4, "the transitions")
-    assert labels(moves) == ["configuring", "inactive", "activating", "active"]
-
-
-def test_a_step_that_arrives_too_late_is_not_run(member: list[String], peer: Peer) -> None:
-    """Its sender does not wait for it any more: it has seen no report for longer than that."""
-    moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
-    seen = last(member).number
-    for number, transition in enumerate(("configure", "activate"), 1):
-        (result,) = results(peer, seen, Step(number, transition, "/lab/camera"))
-        assert result.success, result.reason
-    wait_until(lambda: last(member).number > seen + 10, "reports of ten seconds")
-    for step in (Step(3, "shutdown", "/lab/camera"), Step(4, "deactivate", "/lab/camera")):
-        late = ChangeStates("", "peer", seen, (step,))
-        peer.client(RequestService, SERVICE).call_async(request_message(late))
-    (result,) = results(peer, last(member).number, Step(5, "cleanup", "/lab/camera"))
-    assert "the node is active" in result.reason  # requests arrive in order
-    assert labels(moves) == ["configuring", "inactive", "activating", "active"]
 
 
 def last(reports: list[String]) -> SystemReport:

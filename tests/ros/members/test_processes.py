@@ -66,11 +66,11 @@ def all_alive(pids: set[int]) -> set[int]:
     return set(filter(alive, pids))
 
 
-def test_up_in_order_data_flows_and_down(
+def test_up_in_order_data_flows_errors_count_and_down(
     tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_SECURITY_ENCLAVE_OVERRIDE", "/lab/robot")
-    with split(tmp_path) as system:
+    with split(tmp_path, fail_on_error=True) as system:
         active = [text for text in system.states() if text.endswith(" active")]
         assert active == ["/lab/camera active", "/lab/detector active", "/lab/arm active"]
         system.wait_for_log("found picture")
@@ -96,9 +96,15 @@ def test_up_in_order_data_flows_and_down(
         wait_until(lambda: system.node("detector").state == "inactive", "the state")
         assert peer.change("/lab/detector", "activate")
         wait_until(lambda: system.node("detector").state == "active", "the state")
+        # Errors in another process fail the run.
+        assert peer.set_parameter("/lab/detector", "mood", "angry") == ""
+        system.wait_for_log("no cat")
         outcome = system.stop()
-        assert outcome.exit_code == 0
+        assert outcome.exit_code == 1
         assert not system.reported(NodeFailed)
+        camera, detector, _ = outcome.nodes
+        assert (camera.errors, detector.errors > 0) == (0, True)
+        assert camera.sent >= detector.received > 0
         called = {callback.node: callback for callback in outcome.callbacks if callback.count}
         assert called.keys() == {"/lab/camera", "/lab/detector", "/lab/arm"}
         assert called["/lab/camera"].callback == "timer 'tick'"
@@ -151,16 +157,3 @@ def test_a_bring_up_over_processes_is_rolled_back(tmp_path: Path) -> None:
     for name in ("/lab/camera", *(f"/lab/{name}" for name in idle)):
         assert system.states(name)[-2:] == [f"{name} unconfigured", f"{name} finalized"]
     assert "/lab/arm active" not in system.states()
-
-
-def test_errors_in_another_process_fail_the_run(tmp_path: Path) -> None:
-    text = TEXT.replace('mood: ""', "mood: angry")
-    with split(tmp_path, text, fail_on_error=True) as system:
-        system.wait_for_log("no cat")
-        outcome = system.stop()
-    summaries = {node.node: node for node in outcome.nodes}
-    assert outcome.exit_code == 1
-    assert summaries["/lab/detector"].errors > 0
-    assert summaries["/lab/detector"].received > 0
-    assert summaries["/lab/camera"].errors == 0
-    assert summaries["/lab/camera"].sent >= summaries["/lab/detector"].received

@@ -183,29 +183,22 @@ def number(process: int) -> bytes:
     return (process & 0xFFFF).to_bytes(2, "little")
 
 
-def test_a_command_discovers_others_on_this_host_without_shared_memory(
+def test_a_command_discovers_others_without_shared_memory_and_is_forgotten_soon(
     peer: Peer,
 ) -> None:
-    done = subprocess.run(
-        [*PYTHON, "-c", PRINT_TRANSPORTS], check=True, capture_output=True, text=True, timeout=50.0
-    )
-    others, ports, shared = json.loads(done.stdout.splitlines()[-1])
-    assert [peer.node.get_name(), peer.node.get_namespace()] in others
-    assert shared == []
-    multicast = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
-    assert ports
-    assert multicast not in ports
-
-
-def test_a_command_is_forgotten_soon(peer: Peer) -> None:
     def participants() -> int:
         return len(peer.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True))
 
     before = participants()
+    multicast = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
+    command = [*PYTHON, "-c", PRINT_TRANSPORTS]
     for _ in range(3):  # most of their goodbye messages are lost
-        subprocess.run(
-            [*PYTHON, "-c", PRINT_TRANSPORTS], check=True, capture_output=True, timeout=50.0
-        )
+        done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=50.0)
+        others, ports, shared = json.loads(done.stdout.splitlines()[-1])
+        assert [peer.node.get_name(), peer.node.get_namespace()] in others
+        assert shared == []
+        assert ports
+        assert multicast not in ports
     ended_s = time.monotonic()
     wait_until(lambda: participants() <= before, "their end")
     assert time.monotonic() - ended_s < FORGOTTEN_WITHIN_S

@@ -14,6 +14,7 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTran
 from std_srvs.srv import Trigger
 
 from composer.runtime.node.interruption import CallbackInterrupted
+from composer.runtime.supervision.events import Logged
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SUBJECT = """
@@ -136,59 +137,84 @@ TRANSITIONS = {
     "cleanup": (["configure"], "unconfigured", "inactive", "unconfigured"),
     "shutdown": (["configure", "activate"], "finalized", "finalized", "unconfigured"),
 }
+DOWN = {"inactive": ("cleanup",), "active": ("deactivate", "cleanup")}
+OUTCOMES_SYSTEM = """
+system: outcomes
+nodes:
+  plain:
+    lifecycle: {autostart: unconfigured}
+    parameters: {outcome: -1}
+    behavior: subject:Plain
+  async:
+    lifecycle: {autostart: unconfigured}
+    parameters: {outcome: -1}
+    behavior: subject:Async
+  other:
+    services:
+      trigger: {type: std_srvs/srv/Trigger, external: true, respond: {success: true}}
+"""
 
 
 def has_event(events: list[TransitionEvent], state: str) -> bool:
     return bool(events) and events[-1].goal_state.label == state
 
 
-@pytest.mark.parametrize("prefix", ["", "async "])
+def outcomes_module(transition: str) -> str:
+    """Return behaviors whose handler of a transition has each outcome, plain and ``async``."""
+    module = """
+from composer.behavior import Behavior, TransitionFailed
+
+class WithoutText(Exception):
+    def __str__(self):
+        raise RuntimeError("no text")
+
+class Subject(Behavior):
+    def on_error(self, cause):
+        self.log.info(f"cause: {type(cause).__name__}")
+"""
+    for name, prefix, wait in (("Plain", "", ""), ("Async", "async ", "await ")):
+        module += f"""
+class {name}(Subject):
+    {prefix}def on_{transition}(self):
+        if self.parameters.outcome >= 0:
+            return {wait}getattr(self, f"outcome_{{self.parameters.outcome}}")()
+"""
+        for number, (body, _) in enumerate(OUTCOMES):
+            module += f"\n    {prefix}def outcome_{number}(self):\n        {body}\n"
+    return module
+
+
 @pytest.mark.parametrize("transition", TRANSITIONS)
 def test_every_outcome_of_a_handler_leads_to_a_primary_state(
-    tmp_path: Path, peer: Peer, transition: str, prefix: str
+    tmp_path: Path, peer: Peer, transition: str
 ) -> None:
     before, *ends = TRANSITIONS[transition]
-    module = f"""
-    from composer.behavior import Behavior, TransitionFailed
-
-    class WithoutText(Exception):
-        def __str__(self):
-            raise RuntimeError("no text")
-
-    class Subject(Behavior):
-        {prefix}def on_{transition}(self):
-            if self.parameters.outcome >= 0:
-                return {prefix and "await "}getattr(self, f"outcome_{{self.parameters.outcome}}")()
-
-        def on_error(self, cause):
-            self.log.info(f"cause: {{type(cause).__name__}}")
-    """
-    for number, (body, _) in enumerate(OUTCOMES):
-        module += f"\n        {prefix}def outcome_{number}(self):\n            {body}\n"
-    text = SUBJECT.replace("    behavior: sub", "    parameters: {outcome: -1}\n    behavior: sub")
-    with running(text, tmp_path, subject=module) as system:
-        events = peer.listen(TransitionEvent, "/subject/transition_event")
-        for number, (body, outcome) in enumerate(OUTCOMES):
-            if transition == "shutdown" and outcome != "error":
-                continue  # no transition leaves finalized
-            for step in before:
-                assert peer.change("/subject", step)
-            assert peer.set_parameter("/subject", "outcome", number) == ""
-            answer = peer.change("/subject", transition)
-            assert answer is (outcome == "success"), body
-            end = ends[("success", "failure", "error").index(outcome)]
-            assert peer.state("/subject") == end, body
-            wait_until(partial(has_event, events, end), f"the event of {end}")
-            assert peer.set_parameter("/subject", "outcome", -1) == ""
-            for step in {"inactive": ["cleanup"], "active": ["deactivate", "cleanup"]}.get(end, []):
-                assert peer.change("/subject", step)
-            assert peer.call(Trigger, "/trigger").success, "the other node still works"
-    log = system.log_text()
-    assert f"on_{transition}: ValueError: broken\nTraceback" in log
-    assert f"on_{transition}: WrongReturn: on_{transition} returned 'nonsense'" in log
-    assert "cause: SystemExit" in log
-    if transition != "shutdown":
-        assert f"on_{transition} refused the transition: not now" in log
+    with running(OUTCOMES_SYSTEM, tmp_path, subject=outcomes_module(transition)) as system:
+        for node in ("/plain", "/async"):
+            events = peer.listen(TransitionEvent, f"{node}/transition_event")
+            for number, (body, outcome) in enumerate(OUTCOMES):
+                if transition == "shutdown" and outcome != "error":
+                    continue  # no transition leaves finalized
+                for step in before:
+                    assert peer.change(node, step)
+                assert peer.set_parameter(node, "outcome", number) == ""
+                answer = peer.change(node, transition)
+                assert answer is (outcome == "success"), body
+                end = ends[("success", "failure", "error").index(outcome)]
+                assert peer.state(node) == end, body
+                wait_until(partial(has_event, events, end), f"the event of {end}")
+                assert peer.set_parameter(node, "outcome", -1) == ""
+                for step in DOWN.get(end, ()):
+                    assert peer.change(node, step)
+                assert peer.call(Trigger, "/trigger").success, "the other node still works"
+    for node in ("plain", "async"):
+        lines = [event.message for event in system.reported(Logged) if event.logger == node]
+        log = "\n".join(lines)
+        assert f"on_{transition}: ValueError: broken\nTraceback" in log
+        assert f"on_{transition}: WrongReturn: on_{transition} returned 'nonsense'" in log
+        assert "cause: SystemExit" in log
+        if transition != "shutdown":
+            assert f"on_{transition} refused the transition: not now" in log
 
 
 def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) -> None:

@@ -16,6 +16,7 @@ from rosgraph_msgs.msg import Clock
 from composer.runtime.process import StartRefused
 from composer.runtime.supervision.virtual_time import check_virtual_time
 from tests.cli.compose import compose as in_process
+from tests.ros.supervision.test_external_transitions import busy_processors
 from tests.ros.support.commands import COMPOSE, compose
 from tests.ros.support.in_process import Peer, system_of, wait_until
 from tests.ros.support.system_process import RunningSystem
@@ -150,15 +151,10 @@ def test_fifty_runs_of_examples_are_one(name: str) -> None:
     first = messages_and_log(name, 0)
     assert "active" in first
     for is_busy in (False, True):
-        busy = [subprocess.Popen((sys.executable, "-c", "while 1: 0")) for _ in range(2 * is_busy)]
-        try:
+        with busy_processors(2 * is_busy):
             for hash_seed in range(25):
                 for python in pythons:
                     assert messages_and_log(name, hash_seed, python) == first
-        finally:
-            for process in busy:
-                process.kill()
-                process.wait()
 
 
 @pytest.mark.parametrize("name", ["pipeline", "supervised"])

@@ -22,12 +22,8 @@ from composer.runtime.supervision.events import (
     RollingBack,
     StateChanged,
 )
-from tests.ros.support.in_process import (
-    Peer,
-    RunningSystem,
-    running,
-    wait_until,
-)
+from tests.ros.members.split_robot import alive, pid_of
+from tests.ros.support.in_process import Peer, running, wait_until
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
 DRIVER = f"[{sys.executable}, {PROGRAMS / 'driver.py'}]"
@@ -63,16 +59,6 @@ connections:
   - {{service: /reset_driver, server: driver.reset}}
   - {{action: /drive, server: driver.navigate}}
 """
-
-
-def pid_of(system: RunningSystem, node: str) -> int:
-    pid = system.node(node).pid
-    assert pid is not None
-    return int(pid)
-
-
-def has_ended(pid: int) -> bool:
-    return not Path("/proc", str(pid)).exists()
 
 
 def printed_by(*words: str) -> str:
@@ -123,7 +109,7 @@ def test_up_and_down_in_order_with_names_and_parameters(tmp_path: Path, peer: Pe
         assert "/robot/left/navigate/_action/send_goal" not in services(peer)
         outcome = system.stop()
     assert outcome.exit_code == 0
-    wait_until(lambda: all(map(has_ended, pids)), "the end of the processes")
+    wait_until(lambda: not any(map(alive, pids)), "the end of the processes")
     downs = [text for text in system.states() if not text.endswith(" active")]
     assert downs.index("/robot/listener unconfigured") < downs.index("/robot/camera finalized")
 
@@ -163,7 +149,7 @@ def test_external_transitions_of_a_managed_executable(tmp_path: Path, peer: Peer
         assert peer.change("/robot/camera", "activate")
         wait_until(lambda: system.node("camera").state == "active", "the state")
         system.change("camera", "deactivate", "cleanup")
-        wait_until(lambda: has_ended(pid), "the end of the process")
+        wait_until(lambda: not alive(pid), "the end of the process")
         system.change("camera", "configure", "activate")
         response = peer.call(GetState, "/robot/camera/get_state")
         assert response.current_state.label == "active"
@@ -184,7 +170,7 @@ nodes:
         began_s = time.monotonic()
         outcome = system.stop()
         assert time.monotonic() - began_s < 30.0
-    wait_until(lambda: has_ended(pid), "the end of the process")
+    wait_until(lambda: not alive(pid), "the end of the process")
     assert outcome.exit_code == 0
 
 

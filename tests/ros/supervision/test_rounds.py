@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from composer.runtime.supervision.events import BroughtUp, NodeFailed, Restarted, StateChanged
+from tests.ros.supervision.test_external_transitions import busy_processors
 from tests.ros.support.in_process import running, wait_until
 
 DRIVER = Path(__file__).parents[1] / "programs" / "driver.py"
@@ -34,16 +32,6 @@ nodes:
 """
 
 
-@contextmanager
-def busy_loop() -> Iterator[None]:
-    process = subprocess.Popen([sys.executable, "-c", "while True: pass"])
-    try:
-        yield
-    finally:
-        process.kill()
-        process.wait()
-
-
 @pytest.mark.parametrize(
     "rounds", [1, pytest.param(100, marks=[pytest.mark.soak, pytest.mark.timeout(1800)])]
 )
@@ -51,7 +39,7 @@ def test_a_flaky_driver_comes_up_after_the_nodes_that_do_not_need_it(
     rounds: int, tmp_path: Path
 ) -> None:
     (tmp_path / "flaky.sh").write_text(FLAKY, encoding="utf-8")
-    with busy_loop():
+    with busy_processors(1):
         for number in range(rounds):
             fails = number % 3 + 1
             (tmp_path / "tries").write_text("0", encoding="utf-8")
