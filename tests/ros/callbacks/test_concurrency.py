@@ -136,76 +136,49 @@ def test_messages_that_arrive_while_a_node_is_inactive_do_not_wait_for_it(
     assert (counted.received, counted.dropped) == (2, 2)
 
 
-def test_reentrant_callbacks_run_at_once_on_several_threads(tmp_path: Path) -> None:
-    text = """
-    system: overlapping
-    executors: {several: {kind: multi_threaded, threads: 3}}
-    nodes:
-      source:
-        behavior: overlapping:Source
-        publishers:
-          output: {type: std_msgs/msg/Int64, topic: /numbers}
-      sink:
-        executor: several
-        behavior: overlapping:Sink
-        subscriptions:
-          input: {type: std_msgs/msg/Int64, topic: /numbers, reentrant: true}
-    """
-    module = """
-    import threading
-    from composer.behavior import Behavior
-
-    class Source(Behavior):
-        pass
-
-    class Sink(Behavior):
-        def on_configure(self):
-            self.both = threading.Barrier(2, timeout=60.0)
-
-        def on_input(self, message):
-            self.both.wait()
-            self.log.info(f"met {message.data}")
-    """
-    with running(text, tmp_path, overlapping=module) as system:
-        output = system.sender("source", "output")
-        output.publish(Int64(data=0))
-        output.publish(Int64(data=1))
-        for number in range(2):
-            system.wait_for_log(f"met {number}")
-
-
-def test_the_callbacks_of_a_node_run_one_at_a_time_on_several_threads(
+def test_on_several_threads_only_reentrant_callbacks_run_at_once(
     tmp_path: Path, peer: Peer
 ) -> None:
     text = """
     system: turns
     executors: {several: {kind: multi_threaded, threads: 4}}
     nodes:
-      turns:
+      source:
+        behavior: turns:Source
+        publishers: {output: {type: std_msgs/msg/Int64, topic: /numbers}}
+      overlapping:
+        executor: several
+        behavior: turns:Overlapping
+        subscriptions: {input: {type: std_msgs/msg/Int64, topic: /numbers, reentrant: true}}
+      one_at_a_time:
         executor: several
         behavior: turns:OneAtATime
-        subscriptions:
-          input: {type: std_msgs/msg/Int64, external: true}
-        timers:
-          tick: {period_ms: 2}
-          async_tick: {period_ms: 2}
+        subscriptions: {input: {type: std_msgs/msg/Int64, external: true}}
+        timers: {tick: {period_ms: 2}, async_tick: {period_ms: 2}}
     """
     module = """
     import threading
     from time import sleep
     from composer.behavior import Behavior
 
+    class Source(Behavior):
+        pass
+
+    class Overlapping(Behavior):
+        def on_configure(self):
+            self.both = threading.Barrier(2, timeout=60.0)
+
+        def on_input(self, message):
+            self.both.wait()
+            self.log.info(f"met {message.data}")
+
     class OneAtATime(Behavior):
         def on_configure(self):
-            self.inside = 0
-            self.most = 0
-            self.calls = 0
-            self.threads = set()
+            self.inside = self.most = self.calls = 0
 
         def work(self):
             self.inside += 1
             self.most = max(self.most, self.inside)
-            self.threads.add(threading.current_thread().name)
             sleep(0.001)
             self.inside -= 1
             self.calls += 1
@@ -220,11 +193,14 @@ def test_the_callbacks_of_a_node_run_one_at_a_time_on_several_threads(
             self.work()
     """
     with running(text, tmp_path, turns=module) as system:
-        source = peer.publisher(Int64, "/input")
+        output, source = system.sender("source", "output"), peer.publisher(Int64, "/input")
+        for number in range(2):
+            output.publish(Int64(data=number))
         for number in range(50):
             source.publish(Int64(data=number))
-        line = system.wait_for_log("at once")
-    assert line == "at most 1 at once"
+        for number in range(2):
+            system.wait_for_log(f"met {number}")
+        assert system.wait_for_log("at once") == "at most 1 at once"
 
 
 def test_python_does_not_warn_of_a_handler_that_is_canceled_before_it_begins() -> None:

@@ -22,7 +22,7 @@ from tests.ros.support.commands import (
     start,
 )
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.observers import observing
+from tests.ros.support.observers import Observer, observing
 
 SYSTEM = """
 system: robot
@@ -86,6 +86,13 @@ def servers(port: int) -> list[int]:
         if b"fast-discovery-server" in words[0] and str(port).encode() in words:
             found.append(int(entry.parent.name))
     return found
+
+
+def wait_for_messages(observer: Observer, count: int) -> None:
+    """Wait until an observer has received so many messages."""
+    until_s = time.monotonic() + PATIENCE_S
+    while observer.ask()[0] < count:
+        assert time.monotonic() < until_s
 
 
 # The first test, as commands wait for the killed programs of others.
@@ -163,20 +170,14 @@ def test_a_killed_server_is_replaced(port: int, shared_domain_id: int, tmp_path:
         (pid,) = servers(port)
         os.kill(pid, signal.SIGKILL)
         system.wait_for("was ended by SIGKILL; the next one starts in 6 s")
-        count, _ = before.ask()
-        until_s = time.monotonic() + PATIENCE_S
-        while before.ask()[0] < count + 20:  # a second of messages
-            assert time.monotonic() < until_s
+        wait_for_messages(before, before.ask()[0] + 20)  # for a second
         assert servers(port) == []
         system.wait_for("is started again")
         (successor,) = wait_until(lambda: servers(port), "the next server")
         assert successor != pid
         with observing("/move", *NODES, environment=environment(port)) as after:
             after.wait_until_ready()
-            count, _ = after.ask()
-            until_s = time.monotonic() + PATIENCE_S
-            while after.ask()[0] == count:
-                assert time.monotonic() < until_s
+            wait_for_messages(after, after.ask()[0] + 1)
         assert system.stop()[0] == 0
 
 
@@ -196,9 +197,7 @@ def test_clients_discover_a_system_that_starts_after_a_killed_one(
             assert servers(port) == []
             count, _ = client.ask()  # nothing is sent before the server runs
             run.wait_for("3 of 3 nodes active")
-            until_s = time.monotonic() + PATIENCE_S
-            while client.ask()[0] == count:
-                assert time.monotonic() < until_s
+            wait_for_messages(client, count + 1)
             assert run.stop()[0] == 0
 
 
@@ -216,9 +215,7 @@ def test_clients_discover_a_system_that_starts_after_one_that_has_ended(
                     run.wait_for("3 of 3 nodes active")
                     if log == "first.txt":
                         client.wait_until_ready()
-                    until_s = time.monotonic() + PATIENCE_S
-                    while client.ask()[0] <= count:
-                        assert time.monotonic() < until_s
+                    wait_for_messages(client, count + 1)
                     assert run.stop()[0] == 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import threading
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -198,11 +199,8 @@ def test_an_external_node_can_cancel_a_goal_of_the_process(tmp_path: Path) -> No
     with running(text_of("auto"), tmp_path, going=MODULE) as system:
         client = go(system, 0.0)
         wait_until(lambda: client.feedback)
-        peer = Peer()
-        try:
+        with closing(Peer()) as peer:
             answer = peer.call(CancelGoal, "/go/_action/cancel_goal")  # all of them
-        finally:
-            peer.close()
         assert len(answer.goals_canceling) == 1
         wait_until(lambda: client.outcomes)
         assert client.outcomes == [("canceled", "turned back")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -145,11 +146,8 @@ def test_a_server_that_shuts_down_refuses_pending_requests_and_serves_external_c
     tmp_path: Path,
 ) -> None:
     with running(text_of("auto"), tmp_path, asking=MODULE) as system:
-        peer = Peer()
-        try:
+        with closing(Peer()) as peer:
             answer = peer.call(SetBool, "/ask", SetBool.Request(data=True))
-        finally:
-            peer.close()
         assert (answer.success, answer.message) == (True, "request 1")
         ask(system, data=False)
         server = system.behavior("server")

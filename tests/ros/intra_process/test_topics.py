@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +24,6 @@ from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 NUMBERING_LISTENER = Path(__file__).parents[1] / "programs" / "numbering_listener.py"
-
-
-@pytest.fixture
-def join_externally() -> Iterator[Callable[[], Peer]]:
-    """Joins when it is called: in-process delivery must work without external nodes."""
-    peers: list[Peer] = []
-
-    def join() -> Peer:
-        peers.append(Peer())
-        return peers[-1]
-
-    yield join
-    for peer in peers:
-        peer.close()
 
 
 def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -> None:
@@ -59,9 +46,10 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])
 def test_local_messages_are_shared_and_external_nodes_receive_them_too(
-    tmp_path: Path, join_externally: Callable[[], Peer], kind: str
+    tmp_path: Path, kind: str
 ) -> None:
-    with running(NUMBERS.replace("KIND", kind), tmp_path, counting=MODULE) as system:
+    text = NUMBERS.replace("KIND", kind)
+    with running(text, tmp_path, counting=MODULE) as system, ExitStack() as joined:
         near, far, source = (system.behavior(name) for name in ("near", "far", "source"))
         send(system, 50)
         wait_until(lambda: len(near.received) == len(far.received) == 50)
@@ -69,7 +57,8 @@ def test_local_messages_are_shared_and_external_nodes_receive_them_too(
         for listener in (near, far):
             assert all(a is b for a, b in zip(listener.received, source.sent, strict=True))
 
-        peer = join_externally()
+        # In-process delivery must work without external nodes, so it joins only now.
+        peer = joined.enter_context(closing(Peer()))
         outside = peer.listen(Int64, "/numbers", 100)
         wait_for_matches(system, lambda count: count == 3)
         send(system, 50)
@@ -181,9 +170,7 @@ nodes:
 """
 
 
-def test_late_joiners_get_latched_messages_once_in_process_and_by_dds(
-    tmp_path: Path, join_externally: Callable[[], Peer]
-) -> None:
+def test_late_joiners_get_latched_messages_once_in_process_and_by_dds(tmp_path: Path) -> None:
     module = """
     from composer.behavior import Behavior
     from std_msgs.msg import Int64
@@ -198,9 +185,10 @@ def test_late_joiners_get_latched_messages_once_in_process_and_by_dds(
             system.change(node, "configure", "activate")
         system.wait_for_log("late 3")
         profile = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        outside = join_externally().listen(Int64, "/mode", profile)
-        wait_until(lambda: len(outside) == 2)
-        assert numbers(outside) == [2, 3]
+        with closing(Peer()) as peer:
+            outside = peer.listen(Int64, "/mode", profile)
+            wait_until(lambda: len(outside) == 2)
+            assert numbers(outside) == [2, 3]
     assert system.log() == ["late 2", "late 3"]
 
 

@@ -117,6 +117,14 @@ def test_commands_pause_resume_reset_and_start_a_system(tmp_path: Path, peer: Pe
             changes = [str(event) for event in system.reported(StateChanged)[before:]]
             assert sorted(changes) == sorted(states), what
             assert command(peer, "is_active")[0] is (message.startswith("2")), what
+        # Finalized nodes are created again.
+        assert peer.change("/fleet/planner", "shutdown")
+        assert not peer.change("/fleet/planner", "configure")
+        assert command(peer, "is_active") == (False, "1 of 3 nodes active")
+        finalized = peer.servers("/fleet/planner/get_state")
+        assert command(peer, "startup") == (True, "2 of 3 nodes active")
+        wait_until(lambda: peer.servers("/fleet/planner/get_state") - finalized, "the new node")
+        assert peer.state("/fleet/planner") == "active"
         assert command(peer, "shutdown")[0]
         assert system.end().exit_code == 0
     assert system.end().reason == "shutdown requested"
@@ -138,19 +146,6 @@ def test_a_system_is_not_active_after_the_failure_of_an_inactive_node(
         assert message.startswith("2 of 3 nodes active, /fleet/camera is isolated: activate ended")
         assert command(peer, "startup") == (True, "2 of 3 nodes active")
         assert command(peer, "is_active")[0]
-
-
-def test_finalized_nodes_are_created_again(tmp_path: Path, peer: Peer) -> None:
-    with running(ROBOT, tmp_path, planner=PLANNER):
-        assert peer.change("/fleet/planner", "shutdown")
-        assert not peer.change("/fleet/planner", "configure")
-        success, message = command(peer, "is_active")
-        assert (success, message) == (False, "1 of 3 nodes active")
-        finalized = peer.servers("/fleet/planner/get_state")
-        assert command(peer, "startup") == (True, "2 of 3 nodes active")
-        wait_until(lambda: peer.servers("/fleet/planner/get_state") - finalized, "the new node")
-        assert peer.state("/fleet/planner") == "active"
-        assert peer.change("/fleet/planner", "deactivate")
 
 
 FAULTS = (
@@ -177,6 +172,7 @@ def test_a_failed_start_is_rolled_back_and_can_be_retried(tmp_path: Path, peer: 
         assert not success
         assert "/fleet/planner: deactivate failed: not now" in message
         assert peer.set_parameter("/fleet/planner", "fault", "") == ""
+        assert command(peer, "startup") == (True, "2 of 3 nodes active")
         assert system.stop().exit_code == 0
 
 
@@ -213,7 +209,13 @@ def test_states_are_published_latched_on_change_and_every_second(
         assert "/fleet/planner is isolated" in diagnostics[-1].status[0].message
 
 
-def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) -> None:
+def test_a_second_instance_is_refused_and_no_status_is_lost(tmp_path: Path, peer: Peer) -> None:
+    def lost() -> int:
+        """Count the messages that ``ros2 topic echo`` reports as replaced before it got them."""
+        with hand_written("hand_written_echo.py", "/fleet/robot/manager/state") as process:
+            assert process.stdout is not None
+            return int(process.stdout.readline())
+
     with running(ROBOT, tmp_path, planner=PLANNER):
         system = system_of(ROBOT, tmp_path)
         second = Host(system, bring_up(system), tear_down(system), HostOptions())
@@ -222,6 +224,8 @@ def test_a_second_instance_of_a_system_is_refused(tmp_path: Path, peer: Peer) ->
         assert "process" in str(refusal.value)
         assert "compose down /fleet/robot" in refusal.value.hint
         assert peer.state("/fleet/planner") == "active"
+        # A process may not be scheduled for longer than the manager waits.
+        wait_until(lambda: lost() == 0, "a subscription that loses no status")
     options = HostOptions(run_for_s=0.1, stop_within_s=20.0)
     again = RunningSystem(system_of(ROBOT, tmp_path), options, None)
     assert again.end().exit_code == 0
@@ -248,16 +252,3 @@ def test_diagnostics_can_be_sent_whatever_user_code_reports() -> None:
     assert values(arm)["last_error"] == "? é"
     assert [values(arm)[key] for key in ("sent", "sent_hz", "busy")] == ["/a=3", "0.5", ""]
     assert (tick.level, tick.message) == (DiagnosticStatus.WARN, "2 over budget, 0 dropped")
-
-
-def test_no_published_status_is_lost(tmp_path: Path) -> None:
-    """``ros2 topic echo`` reports a message that another one replaces before it is received."""
-
-    def lost() -> int:
-        with hand_written("hand_written_echo.py", "/fleet/robot/manager/state") as process:
-            assert process.stdout is not None
-            return int(process.stdout.readline())
-
-    with running(ROBOT, tmp_path, planner=PLANNER):
-        # A process may not be scheduled for longer than the manager waits.
-        wait_until(lambda: lost() == 0, "a subscription that loses nothing")

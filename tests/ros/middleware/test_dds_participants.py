@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -101,11 +102,8 @@ def test_each_participant_on_this_host_is_counted(peer: Peer) -> None:
     domain_id = int(os.environ["ROS_DOMAIN_ID"])
     before = count_participants(domain_id)
     assert before >= 1
-    another = Peer()
-    try:
+    with closing(Peer()):
         assert count_participants(domain_id) == before + 1
-    finally:
-        another.close()
     wait_until(lambda: count_participants(domain_id) == before, "its end")
 
 
@@ -122,11 +120,8 @@ def test_participants_of_ended_processes_are_recognized(peer: Peer) -> None:
     elsewhere = own[:2] + bytes(255 - byte for byte in own[2:4]) + ended[4:]
     assert ended_participants(known | {ended, elsewhere}, domain_id) == {ended}
     # It may run in a container, if another participant holds a port.
-    another = Peer()
-    try:
+    with closing(Peer()):
         assert ended_participants(known | {ended}, domain_id) == frozenset()
-    finally:
-        another.close()
 
 
 class Observer(Node):

@@ -93,8 +93,7 @@ class Planner:
 LOCAL_MODULES = {"helper", "late", "tools", "planner"}
 
 
-@pytest.mark.parametrize("name", ["first", "second"])
-def test_modules_next_to_a_behavior_are_imported_for_it_alone(name: str, tmp_path: Path) -> None:
+def test_modules_next_to_a_behavior_are_imported_for_it_alone(tmp_path: Path) -> None:
     for folder in ("first", "second"):
         files = {
             "planner.py": HELPED,
@@ -110,8 +109,9 @@ def test_modules_next_to_a_behavior_are_imported_for_it_alone(name: str, tmp_pat
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding="utf-8")
     before = list(sys.path), set(sys.modules) & LOCAL_MODULES
-    planner = behavior_class(reference("planner:Planner", tmp_path / name))()
-    assert planner.on_tick() == (name, 6, 6, 3, name, name, signal)
+    for name in ("first", "second"):
+        planner = behavior_class(reference("planner:Planner", tmp_path / name))()
+        assert planner.on_tick() == (name, 6, 6, 3, name, name, signal)
     assert (list(sys.path), set(sys.modules) & LOCAL_MODULES) == before
 
 

@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-import yaml
 from std_srvs.srv import Trigger
 
 from composer.runtime.middleware.shared_memory import SHARED_MEMORY
@@ -24,32 +23,29 @@ ATTEMPTS = 3
 COUNT = f"{NODES} of {NODES} nodes active"
 
 
-def large_system() -> str:
-    """Return a system whose nodes have a publisher, a subscription and a service each."""
-    nodes = {
-        f"node_{index:02}": {
-            "publishers": {"output": {"type": "std_msgs/msg/String", "external": True}},
-            "subscriptions": {"input": {"type": "std_msgs/msg/String", "external": True}},
-            "services": {
-                "answer": {
-                    "type": "std_srvs/srv/Trigger",
-                    "service": f"/node_{index:02}/answer",
-                    "external": True,
-                    "respond": {"success": True},
-                }
-            },
-            "on_cleanup": {"log": "cleaned up"},
-        }
-        for index in range(NODES)
-    }
-    lean = {"parameters": False, "type_description": False}
-    return yaml.safe_dump({"system": "large", "introspection": lean, "nodes": nodes})
+#: Its nodes have a publisher, a subscription and a service each.
+LARGE = f"""
+system: large
+introspection: {{parameters: false, type_description: false}}
+nodes:
+  node_${{index}}:
+    for_each: {{index: {NODES}}}
+    publishers: {{output: {{type: std_msgs/msg/String, external: true}}}}
+    subscriptions: {{input: {{type: std_msgs/msg/String, external: true}}}}
+    services:
+      answer:
+        type: std_srvs/srv/Trigger
+        service: /node_${{index}}/answer
+        external: true
+        respond: {{success: true}}
+    on_cleanup: {{log: cleaned up}}
+"""
 
 
 @pytest.mark.timeout(200)
 def test_a_large_system_leaves_the_graph_as_soon_as_it_ends(tmp_path: Path, peer: Peer) -> None:
     path = tmp_path / "large.yaml"
-    path.write_text(large_system(), encoding="utf-8")
+    path.write_text(LARGE, encoding="utf-8")
     # A goodbye message is not acknowledged, so a busy machine may lose one.
     assert any(is_gone_at_once(path, peer) for _ in range(ATTEMPTS))
 
@@ -65,7 +61,7 @@ def is_gone_at_once(path: Path, peer: Peer) -> bool:
             output.append(line)
             if COUNT in line:
                 break
-        client = peer.client(Trigger, "/node_07/answer")
+        client = peer.client(Trigger, "/node_7/answer")
         ours = shared_memory_of(process.pid) - before
         process.send_signal(signal.SIGINT)
         output += process.stderr.readlines()
@@ -73,23 +69,22 @@ def is_gone_at_once(path: Path, peer: Peer) -> bool:
     text = "".join(output)
     assert code == 0, text
     assert text.count("cleaned up") == NODES
-    assert text.index("/node_23 finalized") < text.index("/node_00 finalized")
+    assert text.index("/node_23 finalized") < text.index("/node_0 finalized")
     assert ours
     assert not [path for path in ours if path.exists()]
     ended_s = time.monotonic()
-    while client.service_is_ready() or "node_07" in peer.node.get_node_names():
+    while client.service_is_ready() or "node_7" in peer.node.get_node_names():
         assert time.monotonic() - ended_s < 2 * LEASE_S
         time.sleep(0.01)
     return time.monotonic() - ended_s < LEASE_S / 2
 
 
 def test_a_state_can_be_read_while_the_node_is_destroyed(tmp_path: Path) -> None:
-    nodes = {f"node_{index}": {} for index in range(10)}
-    text = yaml.safe_dump({"system": "small", "nodes": nodes})
+    text = "{system: small, nodes: {'node_${index}': {for_each: {index: 10}}}}"
     states: set[str] = set()
     over = threading.Event()
     with running(text, tmp_path) as system:
-        running_nodes = [system.node(name) for name in nodes]
+        running_nodes = [system.node(f"node_{index}") for index in range(10)]
 
         def poll() -> None:
             while not over.wait(0.001):
