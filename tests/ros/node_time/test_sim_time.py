@@ -83,6 +83,13 @@ def test_timers_start_pause_and_jump_with_the_clock(tmp_path: Path, peer: Peer, 
         wait_for_ticks(system, 1000.1, 1100.1, 1100.2, 7.1)
         let_real_time_pass(system)
         assert len(ticks(system)) == 4
+        for _ in range(20):
+            simulator.set_invalid_time()  # it is ignored, with one warning
+            let_real_time_pass(system)
+        simulator.set_time(8.0)
+        assert system.node("a").now_s() == 8.0
+        (warning,) = [line for line in system.log() if "/clock" in line]
+        assert warning == "ignored a time of /clock: Seconds value must not be negative"
         assert system.reported(CallbackFailed) == []
 
 
@@ -288,19 +295,6 @@ def test_a_parameter_file_sets_it_for_all_nodes(tmp_path: Path, peer: Peer) -> N
         simulator = Simulator(peer, system)
         simulator.set_time(5.0, node="a")
         simulator.set_time(6.0, node="b")
-
-
-def test_times_that_are_not_valid_are_ignored_with_one_warning(tmp_path: Path, peer: Peer) -> None:
-    with running(SYSTEM.format(kind="events"), tmp_path) as system:
-        simulator = Simulator(peer, system)
-        simulator.set_time(10.0)
-        for _ in range(20):
-            simulator.set_invalid_time()
-            let_real_time_pass(system)
-        simulator.set_time(11.0)
-        assert system.node("a").now_s() == 11.0
-        (warning,) = [line for line in system.log() if "/clock" in line]
-        assert warning == "ignored a time of /clock: Seconds value must not be negative"
 
 
 WATCHED = """
