@@ -88,7 +88,7 @@ def children(pid: int) -> list[int]:
     for parent in pids:  # grows
         with suppress(FileNotFoundError):  # the process ends just now
             for task in Path(f"/proc/{parent}/task").iterdir():
-                with suppress(FileNotFoundError):  # the thread ends just now
+                with suppress(FileNotFoundError, ProcessLookupError):  # the thread ends just now
                     pids += map(int, (task / "children").read_text(encoding="ascii").split())
     return pids
 
