@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from composer.runtime.host_options import HostOptions
-from tests.ros.support.in_process import RunningSystem, running
+from tests.ros.support.in_process import PATIENCE_S, RunningSystem, running
 
 TEXT = """
 system: robot
@@ -62,6 +65,29 @@ class Arm(Behavior):
 
 def command_of(path: Path) -> tuple[str, ...]:
     return (sys.executable, "-m", "composer", "run", str(path))
+
+
+@contextmanager
+def members(
+    path: Path, *names: str, stderr: int = subprocess.DEVNULL, **environment: str
+) -> Iterator[list[subprocess.Popen[str]]]:
+    """Run processes of a system by hand, without a coordinator; end them as Ctrl-C does."""
+    processes = [
+        subprocess.Popen(
+            [*command_of(path), "--process", name],
+            stderr=stderr,
+            text=True,
+            env={**os.environ, **environment},
+        )
+        for name in names
+    ]
+    try:
+        yield processes
+    finally:
+        for process in processes:
+            process.send_signal(signal.SIGINT)
+        for process in processes:
+            process.wait(PATIENCE_S)
 
 
 @contextmanager

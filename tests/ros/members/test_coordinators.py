@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,7 +26,7 @@ from composer.runtime.process.instance_lock import (
 )
 from composer.runtime.ros.manager_interface import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
-from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, split, states
+from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, members, split, states
 from tests.ros.support.commands import code_of_end
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system_of, wait_until
 from tests.ros.support.system_process import RunningSystem as CommandProcess
@@ -41,17 +40,8 @@ def started_by_hand(
     path = folder / "robot.yaml"
     path.write_text(text, encoding="utf-8")
     folder.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
-    members = [
-        subprocess.Popen([*command_of(path), "--process", name], stderr=stderr, text=True)
-        for name in ("sensing", "acting")
-    ]
-    try:
-        yield path, members
-    finally:
-        for member in members:
-            member.send_signal(signal.SIGINT)
-        for member in members:
-            member.wait(PATIENCE_S)
+    with members(path, "sensing", "acting", stderr=stderr) as processes:
+        yield path, processes
 
 
 @pytest.mark.timeout(200)
@@ -63,7 +53,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     # With this backoff, the process returns before the coordinator starts one in its place.
     text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
     text = text.replace("  arm:\n", "  arm:\n    behavior: detector:Arm\n")
-    with started_by_hand(tmp_path, text) as (path, members):
+    with started_by_hand(tmp_path, text) as (path, processes):
         wait_until(lambda: len(running_managers(peer)) == 2, "the processes", 2.0 * PATIENCE_S)
         moves = coordinate_and_pause(path, peer)
         with split(tmp_path, text) as system:  # another one, and the pause goes on
@@ -80,17 +70,18 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             assert not system.reported(NodeFailed)
             assert not moves
 
-            members[0].kill()
+            processes[0].kill()
             failed = wait_for_failure(system)
             # Only what has started it may start it again, whatever the policy.
             assert str(failed).endswith("process 'sensing' has ended; waiting for it")
             assert system.node("detector").state == "inactive"
-            members[0].wait()
-            members[0] = subprocess.Popen([*command_of(path), "--process", "sensing"])
+            processes[0].wait()
+            command = [*command_of(path), "--process", "sensing"]
+            processes[0] = subprocess.Popen(command, text=True)
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
 
             forget(moves, "active")
-            stop_until_the_pause(members[1], system, peer)
+            stop_until_the_pause(processes[1], system, peer)
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
             assert not moves  # it was active all the time
             assert system.node("camera").activations == 2
@@ -101,8 +92,8 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             found.clear()
             wait_until(lambda: len(found) > 10, "messages of nodes that are still active")
             assert not moves
-        assert all(member.poll() is None for member in members)
-    assert [member.returncode for member in members] == [0, 0]
+        assert all(member.poll() is None for member in processes)
+    assert [member.returncode for member in processes] == [0, 0]
 
 
 def stop_until_the_pause(member: subprocess.Popen[str], system: RunningSystem, peer: Peer) -> None:
@@ -167,11 +158,11 @@ def forget(moves: list[TransitionEvent], goal: str) -> None:
 def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
     # The coordinator starts both as well, at the same time.
     with (
-        started_by_hand(tmp_path, stderr=subprocess.PIPE) as (_, members),
+        started_by_hand(tmp_path, stderr=subprocess.PIPE) as (_, processes),
         split(tmp_path) as system,
     ):
         assert states(system) == {"active"}
-        for member, node in zip(members, ("camera", "detector"), strict=True):
+        for member, node in zip(processes, ("camera", "detector"), strict=True):
             if system.node(node).pid is not None:
                 assert "already runs in ROS domain" in member.communicate(timeout=60.0)[1]
                 assert member.returncode == 1
@@ -180,13 +171,13 @@ def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
 
 
 def test_the_last_counters_of_processes_that_stay(tmp_path: Path) -> None:
-    with started_by_hand(tmp_path) as (_, members):
+    with started_by_hand(tmp_path) as (_, processes):
         wait_until(lambda: len(local_systems()) == 2, "the processes")
         with split(tmp_path) as system:
             found = system.node("arm").statistics
             wait_until(lambda: found.received > 20, "messages")
             outcome = system.stop()
-        assert [member.poll() for member in members] == [None, None]
+        assert [member.poll() for member in processes] == [None, None]
     camera, detector, arm = outcome.nodes
     # Each is deactivated after the nodes that receive its messages.
     assert camera.sent >= detector.received >= detector.sent >= arm.received > 20
@@ -291,18 +282,13 @@ def test_a_process_that_ends_by_itself_takes_its_nodes_down_in_order(
 ) -> None:
     monkeypatch.setenv("RECORD", str(tmp_path / "record"))
     path = write_system(tmp_path)
-    command = [sys.executable, "-m", "composer", "run", str(path), "--process", "a"]
-    member = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-    try:
+    with members(path, "a") as (member,):
         wait_until(lambda: is_held("/chain/a"), "the process")
         with CommandProcess(str(path)) as system:
             system.wait_for("9 of 9 nodes active")
             system.stop(signal.SIGKILL)
             member.send_signal(signal.SIGINT)
             assert member.wait(60) == 0
-    finally:
-        member.kill()
-        member.wait()
     own = [name for name in reversed(CHAIN) if name.startswith("a")]
     down = [name for name in recorded(tmp_path, "shutdown") if name.startswith("a")]
     assert down == own

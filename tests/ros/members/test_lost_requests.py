@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +27,7 @@ from composer.runtime.ros.manager_interface import (
 )
 from composer.runtime.supervision.events import NodeFailed, Restarted
 from tests.ros.members.split_robot import TEXT as ROBOT
-from tests.ros.members.split_robot import command_of, split
+from tests.ros.members.split_robot import members, split
 from tests.ros.support.in_process import Peer, finished, wait_until
 
 TEXT = """
@@ -84,8 +83,7 @@ def test_a_step_that_arrives_twice_or_too_late_is_not_run(tmp_path: Path, peer: 
     path = tmp_path / "robot.yaml"
     path.write_text(TEXT, encoding="utf-8")
     tmp_path.joinpath("busy.py").write_text(BUSY, encoding="utf-8")
-    process = subprocess.Popen([*command_of(path), "--process", "other"], stderr=subprocess.DEVNULL)
-    try:
+    with members(path, "other") as (process,):
         member = peer.listen(String, STATE, STATE_QOS)
         wait_until(lambda: member and last(member).activity == "running", "its nodes")
         moves = peer.listen(TransitionEvent, "/lab/camera/transition_event")
@@ -111,9 +109,7 @@ def test_a_step_that_arrives_twice_or_too_late_is_not_run(tmp_path: Path, peer: 
         assert "the node is active" in result.reason  # requests arrive in order
         wait_until(lambda: len(moves) >= 4, "the transitions")
         assert labels(moves) == ["configuring", "inactive", "activating", "active"]
-    finally:
-        process.terminate()
-        assert process.wait(60.0) == 0
+    assert process.returncode == 0
 
 
 def last(reports: list[String]) -> SystemReport:
@@ -265,12 +261,7 @@ def test_a_process_of_another_computer_is_known_by_its_service(
     path.write_text(SMALL, encoding="utf-8")
     other = tmp_path / "other"
     other.mkdir()
-    member = subprocess.Popen(
-        [*command_of(path), "--process", "sensing"],
-        env={**os.environ, "XDG_RUNTIME_DIR": str(other)},
-        stderr=subprocess.DEVNULL,
-    )
-    try:
+    with members(path, "sensing", XDG_RUNTIME_DIR=str(other)) as (member,):
         wait_until(lambda: peer.node.count_publishers(TOPIC) == 2, "the process")
         monkeypatch.setattr("tests.ros.members.split_robot.command_of", lambda _: ())
         with split(tmp_path, SMALL) as system:
@@ -279,6 +270,3 @@ def test_a_process_of_another_computer_is_known_by_its_service(
             assert f"it is used: host {os.uname().nodename}, process {member.pid}" in (
                 system.log_text()
             )
-    finally:
-        member.send_signal(signal.SIGINT)
-        member.wait(30)

@@ -1,7 +1,8 @@
-"""Discovery between computers whose network does not forward multicast."""
+"""Computers of the tests on one network, and discovery if it does not forward multicast."""
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -11,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from tests.ros.network.namespaces import PATIENCE_S, Computer, network
+from tests.ros.support.commands import PROGRAMS
 from tests.ros.support.observers import Observer, observing
 
-pytestmark = pytest.mark.soak  # what one computer can show is in tests/ros/children
 COMPOSE = (sys.executable, "-m", "composer")
 SYSTEM = """
 system: robot
@@ -77,6 +78,7 @@ def wait_for(text: str, log: Path) -> None:
         time.sleep(0.02)  # poll: nothing announces changes of the file
 
 
+@pytest.mark.soak  # what one computer can show is in tests/ros/children
 def test_peers_discover_each_other(
     computers: list[Computer], write_system: Callable[..., Path]
 ) -> None:
@@ -97,6 +99,7 @@ def test_peers_discover_each_other(
     assert f"export {variables}\n" in log.read_text()
 
 
+@pytest.mark.soak
 def test_processes_of_two_computers_use_one_server(
     computers: list[Computer], write_system: Callable[..., Path]
 ) -> None:
@@ -112,3 +115,51 @@ def test_processes_of_two_computers_use_one_server(
             other.wait_until_ready()
             assert other.ask() == (0, ["observer"])
         assert "discovery server" not in of_base.read_text()
+
+
+@pytest.fixture(scope="module")
+def plain_computers() -> Iterator[list[Computer]]:
+    with network(["robot", "base"]) as made:
+        yield made
+
+
+def test_ros_nodes_discover_each_other_by_multicast(plain_computers: list[Computer]) -> None:
+    robot, base = plain_computers
+    talker = robot.start(
+        sys.executable, str(PROGRAMS / "hand_written_talker.py"), stdout=subprocess.PIPE
+    )
+    assert talker.stdout is not None
+    assert "ready\n" in talker.stdout
+    command = (sys.executable, "-m", "composer", "topic", "echo", "/lab/text", "--once")
+    assert "xxx" in base.check(*command)
+    # Shared memory would be a way around the network.
+    assert "fastrtps_port" in robot.check("ls", "/dev/shm")
+    assert "fastrtps_port" not in base.check("ls", "/dev/shm")
+    robot.kill_all()
+    talker.wait(PATIENCE_S)
+    assert not robot.processes("hand_written_talker")
+
+
+def test_a_link_can_be_cut_and_restored(plain_computers: list[Computer]) -> None:
+    robot, base = plain_computers
+    server = "import socket; s = socket.create_server(('', 5000)); print('ready', flush=True); "
+    listening = robot.start(
+        *(sys.executable, "-I", "-c", server + "[s.accept() for _ in range(9)]"),
+        stdout=subprocess.PIPE,
+    )
+    assert listening.stdout is not None
+    assert listening.stdout.readline() == "ready\n"
+    client = f"import socket; socket.create_connection(('{robot.address}', 5000), timeout=0.5)"
+
+    def reaches() -> bool:
+        return base.run(sys.executable, "-I", "-c", client).returncode == 0
+
+    assert reaches()
+    robot.cut()
+    assert not reaches()
+    robot.join()
+    end_s = time.monotonic() + PATIENCE_S
+    while not reaches():
+        assert time.monotonic() < end_s
+    robot.kill_all()
+    listening.wait(PATIENCE_S)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
 import subprocess
@@ -17,6 +16,7 @@ from std_srvs.srv import Trigger
 from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import PATIENCE_S, Peer, running, wait_until
+from tests.ros.support.system_process import RunningSystem
 
 #: Functions of rcl that never return, with the GIL held, if a variable names them.
 HANGING_RCL = """
@@ -57,33 +57,6 @@ def hanging_rcl(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return library
 
 
-def start(*arguments: object, **environment: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*COMPOSE, "run", *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, **environment},
-    )
-
-
-def wait_for_line(process: subprocess.Popen[str], words: str) -> None:
-    assert process.stderr is not None
-    for line in process.stderr:
-        if words in line:
-            return
-    raise AssertionError(f"it ended without '{words}'")
-
-
-def rest_of(process: subprocess.Popen[str]) -> str:
-    """Wait for the end; return the output since the last line that was read."""
-    assert process.stderr is not None
-    output = process.stderr.read()  # communicate() would skip lines that were read ahead
-    process.wait(PATIENCE_S)
-    return output
-
-
 @pytest.mark.parametrize(
     ("function", "last_line", "said"),
     [
@@ -93,16 +66,21 @@ def rest_of(process: subprocess.Popen[str]) -> str:
     ],
 )
 def test_a_start_or_an_end_that_hangs_in_the_middleware_ends(
-    hanging_rcl: Path, function: str, last_line: str, said: tuple[str, ...]
+    hanging_rcl: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    function: str,
+    last_line: str,
+    said: tuple[str, ...],
 ) -> None:
-    hanging = {"LD_PRELOAD": str(hanging_rcl), "HANG_IN": function}
-    process = start("minimal", "--grace", 1, **hanging)  # the default is 10 s
-    wait_for_line(process, last_line)
-    process.send_signal(signal.SIGTERM)
-    output = rest_of(process)
-    assert process.returncode == 1
+    monkeypatch.setenv("LD_PRELOAD", str(hanging_rcl))
+    monkeypatch.setenv("HANG_IN", function)
+    # The default is 10 s.
+    with RunningSystem("minimal", "--grace", "1", program=COMPOSE) as run:
+        run.wait_for(last_line)
+        run.process.send_signal(signal.SIGTERM)
+        assert run.wait() == 1
     for part in said:  # and the Python stack
-        assert part in output
+        assert part in run.output
 
 
 def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:
@@ -127,12 +105,11 @@ def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:
             """
         )
     )
-    process = start(path, "--for", 0.1, "--grace", 1)
-    wait_for_line(process, "shutting down: --for elapsed")
-    output = rest_of(process)
-    assert process.returncode == 1
-    assert "Timeout (0:00:01)!" in output
-    assert "in work_forever" in output
+    with RunningSystem(str(path), "--for", "0.1", "--grace", "1", program=COMPOSE) as run:
+        run.wait_for("shutting down: --for elapsed")
+        assert run.wait() == 1
+    assert "Timeout (0:00:01)!" in run.output
+    assert "in work_forever" in run.output
 
 
 NODES = 24
@@ -172,20 +149,13 @@ def test_a_large_system_leaves_the_graph_as_soon_as_it_ends(tmp_path: Path, peer
 def is_gone_at_once(path: Path, peer: Peer) -> bool:
     """Run and stop the system; return whether the peer noticed before the lease ended."""
     before = set(SHARED_MEMORY.iterdir())
-    command = [*COMPOSE, "run", str(path)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        output = []
-        for line in process.stderr:
-            output.append(line)
-            if COUNT in line:
-                break
+    with RunningSystem(str(path), program=COMPOSE) as run:
+        run.wait_for(COUNT)
         client = peer.client(Trigger, "/node_7/answer")
-        ours = shared_memory_of(process.pid) - before
-        process.send_signal(signal.SIGINT)
-        output += process.stderr.readlines()
-        code = process.wait(PATIENCE_S)
-    text = "".join(output)
+        ours = shared_memory_of(run.process.pid) - before
+        run.process.send_signal(signal.SIGINT)
+        code = run.wait()
+    text = run.output
     assert code == 0, text
     assert text.count("cleaned up") == NODES
     assert text.index("/node_23 finalized") < text.index("/node_0 finalized")
