@@ -20,6 +20,7 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.metrics.statistics import CallbackStatistics
 from tests.ros.support.in_process import Peer, running, wait_until
 from tests.ros.support.system_process import RunningSystem as InAProcess
+from tests.ros.support.system_process import write_system
 
 SLOW = """
 system: slow
@@ -295,9 +296,7 @@ def test_callbacks_that_change_a_message_are_named_if_it_is_checked(
 
 
 def test_the_option_of_the_command_line(tmp_path: Path) -> None:
-    path = tmp_path / "changing.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    path.with_name("changing.py").write_text(MODULE, encoding="utf-8")
+    path = write_system(tmp_path, TEXT, changing=MODULE)
     with InAProcess(str(path), "--check-mutation") as system:
         line = system.wait_for(re.escape(FORGERY))
         assert "[ERROR] [forger]" in line

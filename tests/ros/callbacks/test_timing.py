@@ -16,6 +16,7 @@ from composer.runtime.metrics.statistics import CallbackStatistics
 from tests.ros.support.commands import output_of
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 from tests.ros.support.system_process import RunningSystem as CommandProcess
+from tests.ros.support.system_process import write_system
 
 EVERY_KIND = """
 system: traced
@@ -256,9 +257,7 @@ def compose(*arguments: str) -> dict[str, Any]:
 def system(
     tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int
 ) -> Iterator[CommandProcess]:
-    path = tmp_path_factory.mktemp("timed") / "timed.yaml"
-    path.write_text(SYSTEM, encoding="utf-8")
-    path.with_name("timed.py").write_text(BEHAVIORS, encoding="utf-8")
+    path = write_system(tmp_path_factory.mktemp("timed"), SYSTEM, timed=BEHAVIORS)
     with CommandProcess(str(path)) as running:
         running.wait_for("4 of 4 nodes active")
         yield running

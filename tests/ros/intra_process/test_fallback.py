@@ -25,7 +25,7 @@ from composer.runtime.intra_process.ignore_local_publications import (
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.sequences import Sequences
-from tests.ros.support.system_process import RunningSystem
+from tests.ros.support.system_process import RunningSystem, write_system
 
 MIDDLEWARES = Path(__file__).with_name("middlewares")
 PER_WRITER, WRITERS, LATCHED = 400, 3, 3
@@ -139,9 +139,7 @@ def test_the_offsets_of_fields_are_those_of_the_headers(tmp_path: Path) -> None:
 def test_every_message_arrives_once_with_any_middleware_and_the_doctor_reports_it(
     middleware: str | None, tmp_path: Path, peer: Peer
 ) -> None:
-    path = tmp_path / "fallback.yaml"
-    path.write_text(SYSTEM, encoding="utf-8")
-    path.with_name("counting.py").write_text(BEHAVIORS, encoding="utf-8")
+    path = write_system(tmp_path, SYSTEM, counting=BEHAVIORS)
     outside = Sequences()
     with preloaded(middleware, tmp_path):
         running = RunningSystem(str(path), "--log-level", "debug", program=COMPOSE)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from composer.runtime.host_options import HostOptions
 from tests.ros.support.in_process import PATIENCE_S, RunningSystem, running
+from tests.ros.support.system_process import write_system
 
 TEXT = """
 system: robot
@@ -99,8 +100,7 @@ def split(
     all_or_nothing: bool = False,
 ) -> Iterator[RunningSystem]:
     """Run the system as ``compose run`` does, with this process as the coordinating one."""
-    path = folder / "robot.yaml"
-    path.write_text(text, encoding="utf-8")
+    path = write_system(folder, text)
     options = HostOptions(
         stop_within_s=20.0,
         member_command=command_of(path),

@@ -30,6 +30,7 @@ from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, members, s
 from tests.ros.support.commands import code_of_end
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system_of, wait_until
 from tests.ros.support.system_process import RunningSystem as CommandProcess
+from tests.ros.support.system_process import write_system
 
 
 @contextmanager
@@ -37,9 +38,7 @@ def started_by_hand(
     folder: Path, text: str = TEXT, stderr: int = subprocess.DEVNULL
 ) -> Iterator[tuple[Path, list[subprocess.Popen[str]]]]:
     """Run both processes of the robot without a coordinator; return the file and the processes."""
-    path = folder / "robot.yaml"
-    path.write_text(text, encoding="utf-8")
-    folder.joinpath("detector.py").write_text(DETECTOR, encoding="utf-8")
+    path = write_system(folder, text, detector=DETECTOR)
     with members(path, "sensing", "acting", stderr=stderr) as processes:
         yield path, processes
 
@@ -186,10 +185,8 @@ def test_the_last_counters_of_processes_that_stay(tmp_path: Path) -> None:
 def test_a_process_is_started_once_its_lock_is_free(tmp_path: Path) -> None:
     """It may belong to a process that is about to end with an earlier coordinator."""
     with hold_instance_lock("/lab/robot/sensing"):
-        (tmp_path / "robot.yaml").write_text(TEXT, encoding="utf-8")
-        options = HostOptions(
-            stop_within_s=20.0, member_command=command_of(tmp_path / "robot.yaml")
-        )
+        path = write_system(tmp_path, TEXT)
+        options = HostOptions(stop_within_s=20.0, member_command=command_of(path))
         system = RunningSystem(system_of(TEXT, tmp_path, detector=DETECTOR), options, None)
         wait_until(lambda: len(system.host.nodes) == 3, "the nodes")
         wait_until(lambda: system.node("detector").pid, "the start of the other process")
@@ -237,15 +234,12 @@ class Recorder(Behavior):
 """
 
 
-def write_system(folder: Path) -> Path:
+def write_chain(folder: Path) -> Path:
     lines = ["system: chain", "processes: {a: {nodes: ['a*']}, b: {nodes: ['b*']}}", "nodes:"]
     for index, name in enumerate(CHAIN):
         needs = f", lifecycle: {{depends_on: [{CHAIN[index - 1]}]}}" if index else ""
         lines.append(f"  {name}: {{behavior: 'recorder:Recorder'{needs}}}")
-    (folder / "recorder.py").write_text(BEHAVIOR, encoding="utf-8")
-    path = folder / "chain.yaml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
+    return write_system(folder, "\n".join(lines), recorder=BEHAVIOR)
 
 
 def recorded(folder: Path, transition: str) -> Sequence[str]:
@@ -258,7 +252,7 @@ def test_a_chain_over_processes_goes_down_in_order(
 ) -> None:
     record = tmp_path / "record"
     monkeypatch.setenv("RECORD", str(record))
-    path = write_system(tmp_path)
+    path = write_chain(tmp_path)
 
     def goes_down_in_time() -> bool:
         record.unlink(missing_ok=True)
@@ -281,7 +275,7 @@ def test_a_process_that_ends_by_itself_takes_its_nodes_down_in_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RECORD", str(tmp_path / "record"))
-    path = write_system(tmp_path)
+    path = write_chain(tmp_path)
     with members(path, "a") as (member,):
         wait_until(lambda: is_held("/chain/a"), "the process")
         with CommandProcess(str(path)) as system:

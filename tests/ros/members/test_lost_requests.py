@@ -29,6 +29,7 @@ from composer.runtime.supervision.events import NodeFailed, Restarted
 from tests.ros.members.split_robot import TEXT as ROBOT
 from tests.ros.members.split_robot import members, split
 from tests.ros.support.in_process import Peer, finished, wait_until
+from tests.ros.support.system_process import write_system
 
 TEXT = """
 system: robot
@@ -80,9 +81,7 @@ def test_a_request_that_a_full_queue_has_dropped_is_sent_again(tmp_path: Path, p
 
 
 def test_a_step_that_arrives_twice_or_too_late_is_not_run(tmp_path: Path, peer: Peer) -> None:
-    path = tmp_path / "robot.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    tmp_path.joinpath("busy.py").write_text(BUSY, encoding="utf-8")
+    path = write_system(tmp_path, TEXT, busy=BUSY)
     with members(path, "other") as (process,):
         member = peer.listen(String, STATE, STATE_QOS)
         wait_until(lambda: member and last(member).activity == "running", "its nodes")
@@ -257,8 +256,7 @@ def test_a_process_of_another_computer_is_known_by_its_service(
     """The coordinating process cannot read its instance lock, and asks it for its key."""
     publisher = peer.node.create_publisher(String, TOPIC, STATE_QOS)
     publisher.publish(String(data="robot"))
-    path = tmp_path / "robot.yaml"
-    path.write_text(SMALL, encoding="utf-8")
+    path = write_system(tmp_path, SMALL)
     other = tmp_path / "other"
     other.mkdir()
     with members(path, "sensing", XDG_RUNTIME_DIR=str(other)) as (member,):

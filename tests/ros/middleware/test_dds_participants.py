@@ -24,6 +24,7 @@ from composer.runtime.ros_graph.graph import RosGraph, participant
 from tests.ros.support.commands import PYTHON, compose, hand_written, running
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.raw_rmw import NodeNames, own_prefix
+from tests.ros.support.system_process import write_system
 
 #: A participant that is not discovered at once is discovered 1 to 3 s later; without the profile,
 #: that is every second one. The share allows for delays on a busy machine.
@@ -274,8 +275,7 @@ def test_a_system_with_a_camera_has_a_large_segment(
     discovery_range: str, tmp_path: Path, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", discovery_range)
-    path = tmp_path / "camera.yaml"
-    path.write_text(SYSTEM % "sensor_msgs/msg/Image", encoding="utf-8")
+    path = write_system(tmp_path, SYSTEM % "sensor_msgs/msg/Image")
     with running(tmp_path / "log", str(path)) as system:
         system.wait_for("1 of 1 nodes active")
         assert max(segment_bytes(system.process.pid)) >= LARGE_SEGMENT_BYTES
@@ -288,8 +288,7 @@ def test_a_system_with_a_camera_has_a_large_segment(
 
 
 def test_a_system_with_small_messages_has_a_small_segment(tmp_path: Path) -> None:
-    path = tmp_path / "camera.yaml"
-    path.write_text(SYSTEM % "sensor_msgs/msg/Range", encoding="utf-8")
+    path = write_system(tmp_path, SYSTEM % "sensor_msgs/msg/Range")
     with running(tmp_path / "log", str(path)) as system:
         system.wait_for("1 of 1 nodes active")
         assert 0 < max(segment_bytes(system.process.pid)) < LARGE_SEGMENT_BYTES / 10

@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from textwrap import dedent
 from typing import Any
 
 import pytest
@@ -20,7 +19,7 @@ from std_srvs.srv import Trigger
 
 from tests.ros.support import commands
 from tests.ros.support.in_process import Peer, finished, wait_until
-from tests.ros.support.system_process import RunningSystem
+from tests.ros.support.system_process import RunningSystem, write_system
 
 SYSTEM = """
 system: subject
@@ -56,8 +55,7 @@ KILOBYTES_AT_ALL, KILOBYTES_PER_CYCLE = 2000, 8
 
 @contextmanager
 def running(folder: Path) -> Iterator[RunningSystem]:
-    path = folder / "subject.yaml"
-    path.write_text(SYSTEM, encoding="utf-8")
+    path = write_system(folder, SYSTEM)
     with RunningSystem(str(path)) as system:
         system.wait_for("1 of 2 nodes active")
         yield system
@@ -243,11 +241,8 @@ class Stuck(Behavior):
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    file = tmp_path / "robot.yaml"
     nodes = "".join(STUCK_NODE.replace("KIND", kind) for kind in KINDS)
-    file.write_text(STUCK + nodes, encoding="utf-8")
-    file.with_name("stuck.py").write_text(dedent(STUCK_MODULE), encoding="utf-8")
-    return file
+    return write_system(tmp_path, STUCK + nodes, stuck=STUCK_MODULE)
 
 
 def test_a_request_is_answered_and_other_nodes_continue(path: Path, peer: Peer) -> None:
@@ -277,9 +272,8 @@ def test_a_request_is_answered_and_other_nodes_continue(path: Path, peer: Peer) 
 
 def test_a_transition_that_waits_for_a_busy_executor_is_not_stuck(tmp_path: Path) -> None:
     """Each takes a part of its time limit; the last one waits longer than its limit."""
-    path = tmp_path / "slow.yaml"
     nodes = "".join(f"  n{number}: {{behavior: slow:Slow}}\n" for number in range(12))
-    path.write_text(f"system: slow\nlifecycle: {{timeout_ms: 3000}}\nnodes:\n{nodes}", "utf-8")
+    text = f"system: slow\nlifecycle: {{timeout_ms: 3000}}\nnodes:\n{nodes}"
     slow = """
     import time
 
@@ -287,7 +281,6 @@ def test_a_transition_that_waits_for_a_busy_executor_is_not_stuck(tmp_path: Path
         def on_configure(self):
             time.sleep(0.3)  # a tenth of its limit
     """
-    path.with_suffix(".py").write_text(dedent(slow), encoding="utf-8")
-    with RunningSystem(str(path)) as system:
+    with RunningSystem(str(write_system(tmp_path, text, slow=slow))) as system:
         system.wait_for("12 of 12 nodes active")
         assert system.stop()[0] == 0

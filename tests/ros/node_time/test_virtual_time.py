@@ -19,7 +19,7 @@ from tests.cli.compose import compose as in_process
 from tests.ros.supervision.test_external_transitions import busy_processors
 from tests.ros.support.commands import COMPOSE, compose
 from tests.ros.support.in_process import Peer, system_of, wait_until
-from tests.ros.support.system_process import RunningSystem
+from tests.ros.support.system_process import RunningSystem, write_system
 
 #: Timers, sleeps, calls that time out, a node that is restarted, a parallel executor, and stamps.
 SYSTEM = """
@@ -94,14 +94,6 @@ class Recorder(Behavior):
 """
 
 
-def written(folder: Path, system: str, parts: str) -> Path:
-    """Write a system and its behaviors; return the path of the system."""
-    folder.joinpath("parts.py").write_text(parts, encoding="utf-8")
-    path = folder / "system.yaml"
-    path.write_text(system, encoding="utf-8")
-    return path
-
-
 def run(system: Path, hash_seed: str, *options: str) -> tuple[str, str]:
     """Run a system for 20 s of virtual time, in a new interpreter; return what it prints."""
     command = (*COMPOSE, "run", str(system), "--time", "virtual", "--for", "20", *options)
@@ -113,7 +105,7 @@ def run(system: Path, hash_seed: str, *options: str) -> tuple[str, str]:
 
 
 def test_the_same_run_byte_by_byte_whatever_the_hash_seed(tmp_path: Path) -> None:
-    system = written(tmp_path, SYSTEM, PARTS)
+    system = write_system(tmp_path, SYSTEM, parts=PARTS)
     first = run(system, "0")
     log = first[1]
     assert log.count("[recorder] 0001") > 280
@@ -220,7 +212,7 @@ WARNED = [
 
 
 def test_deadlines_leases_and_lifespans_are_those_of_virtual_time(tmp_path: Path) -> None:
-    system = written(tmp_path, TIMED, LATE)
+    system = write_system(tmp_path, TIMED, parts=LATE)
     log = run(system, "0")[1].splitlines()
     assert [line for line in log if "[WARN]" in line and "[late]" not in line] == WARNED
     maps = [line for line in log if line.endswith("[late] a map")]
@@ -255,7 +247,7 @@ class Endless(Behavior):
 
 @pytest.mark.parametrize(("nodes", "reason"), ENDLESS)
 def test_a_system_whose_time_does_not_advance_ends(tmp_path: Path, nodes: str, reason: str) -> None:
-    system = written(tmp_path, f"system: endless\nnodes: {nodes}\n", PART_WITHOUT_END)
+    system = write_system(tmp_path, f"system: endless\nnodes: {nodes}\n", parts=PART_WITHOUT_END)
     done = compose("run", str(system), "--time", "virtual", "--for", "60")
     assert done.returncode == 1
     assert re.search(rf"ran for 1.0 s: the time does not advance, {reason}", done.stderr)
@@ -274,7 +266,7 @@ class Hangs(Behavior):
 
 def test_a_callback_that_does_not_return_is_interrupted_at_the_end(tmp_path: Path) -> None:
     node = "{behavior: parts:Hangs, timers: {start: {period_ms: 1000}}}"
-    system = written(tmp_path, f"system: hangs\nnodes: {{x: {node}}}\n", HANGS)
+    system = write_system(tmp_path, f"system: hangs\nnodes: {{x: {node}}}\n", parts=HANGS)
     with RunningSystem(str(system), "--time", "virtual", "--for", "5") as running:
         running.wait_for("it hangs")
         assert running.stop()[0] == 0
@@ -311,7 +303,9 @@ NOTICED = (
 
 
 def test_what_virtual_time_does_not_control_is_named_once(tmp_path: Path) -> None:
-    system = written(tmp_path, "system: outside\nnodes: {x: {behavior: parts:Outside}}\n", OUTSIDE)
+    system = write_system(
+        tmp_path, "system: outside\nnodes: {x: {behavior: parts:Outside}}\n", parts=OUTSIDE
+    )
     log = run(system, "0")[1]
     uses = re.findall(r"parts.py:(\d+) uses (.*), which virtual time does not control; use", log)
     assert uses == [(str(line), name) for line, name in enumerate(NOTICED, 10)]

@@ -8,7 +8,6 @@ import subprocess
 import threading
 import time
 from pathlib import Path
-from textwrap import dedent
 
 import pytest
 from std_srvs.srv import Trigger
@@ -16,7 +15,7 @@ from std_srvs.srv import Trigger
 from composer.runtime.middleware.shared_memory import SHARED_MEMORY
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import PATIENCE_S, Peer, running, wait_until
-from tests.ros.support.system_process import RunningSystem
+from tests.ros.support.system_process import RunningSystem, write_system
 
 #: Functions of rcl that never return, with the GIL held, if a variable names them.
 HANGING_RCL = """
@@ -84,27 +83,24 @@ def test_a_start_or_an_end_that_hangs_in_the_middleware_ends(
 
 
 def test_a_thread_of_a_behavior_does_not_delay_the_end(tmp_path: Path) -> None:
-    path = tmp_path / "worker.yaml"
-    path.write_text(
-        "system: worker\nlifecycle: {timeout_ms: 1.0e+15}\n"  # longer than any timer of C
-        'nodes: {worker: {behavior: "worker:Worker"}}\n'
-    )
-    path.with_suffix(".py").write_text(
-        dedent(
-            """
-            import threading, time
-            from composer.behavior import Behavior
+    text = """
+    system: worker
+    lifecycle: {timeout_ms: 1.0e+15}  # longer than any timer of C
+    nodes: {worker: {behavior: "worker:Worker"}}
+    """
+    module = """
+    import threading, time
+    from composer.behavior import Behavior
 
-            class Worker(Behavior):
-                def on_activate(self):
-                    threading.Thread(target=work_forever, daemon=False).start()
+    class Worker(Behavior):
+        def on_activate(self):
+            threading.Thread(target=work_forever, daemon=False).start()
 
-            def work_forever():
-                while True:
-                    time.sleep(0.1)
-            """
-        )
-    )
+    def work_forever():
+        while True:
+            time.sleep(0.1)
+    """
+    path = write_system(tmp_path, text, worker=module)
     with RunningSystem(str(path), "--for", "0.1", "--grace", "1", program=COMPOSE) as run:
         run.wait_for("shutting down: --for elapsed")
         assert run.wait() == 1
@@ -140,8 +136,7 @@ nodes:
 
 @pytest.mark.timeout(200)
 def test_a_large_system_leaves_the_graph_as_soon_as_it_ends(tmp_path: Path, peer: Peer) -> None:
-    path = tmp_path / "large.yaml"
-    path.write_text(LARGE, encoding="utf-8")
+    path = write_system(tmp_path, LARGE)
     # A goodbye message is not acknowledged, so a busy machine may lose one.
     assert any(is_gone_at_once(path, peer) for _ in range(ATTEMPTS))
 

@@ -20,7 +20,7 @@ from composer.runtime.process.instance_lock import socket_path
 from tests.ros.process.test_restarts import children
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import end_limit_s
-from tests.ros.support.system_process import PATIENCE_S, RunningSystem
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem, write_system
 
 PIPELINE = "systems/pipeline.yaml"
 
@@ -79,9 +79,7 @@ class Hanging(Behavior):
 def test_a_process_with_a_hanging_callback_ends_in_time(
     tmp_path: Path, *, repeat_signal: bool
 ) -> None:
-    path = tmp_path / "hanging.yaml"
-    path.write_text(HANGING, encoding="utf-8")
-    path.with_suffix(".py").write_text(HANGING_MODULE, encoding="utf-8")
+    path = write_system(tmp_path, HANGING, hanging=HANGING_MODULE)
     with compose_run(path) as run:
         run.wait_for(r"\[hanging\] hanging")
         run.process.send_signal(signal.SIGINT)
@@ -155,9 +153,7 @@ class Loud:
 def test_node_logs_reach_the_terminal_at_their_level_and_threads_take_turns_soon(
     tmp_path: Path,
 ) -> None:
-    path = tmp_path / "loud.yaml"
-    path.write_text(LOUD, encoding="utf-8")
-    path.with_suffix(".py").write_text(LOUD_MODULE, encoding="utf-8")
+    path = write_system(tmp_path, LOUD, loud=LOUD_MODULE)
     with RunningSystem(str(path), "--for", "0.1", "--log-level", "debug") as run:
         assert run.wait() == 0
     assert "] [WARN] [robot.loud] a warning\n" in run.output

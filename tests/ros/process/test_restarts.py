@@ -18,7 +18,7 @@ from benchmarks.soak import after_fifths
 from composer.runtime.protocol.requests import REQUEST, Restart
 from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
 from tests.ros.support.in_process import Peer
-from tests.ros.support.system_process import PATIENCE_S, RunningSystem
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem, write_system
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
 SYSTEM = """
@@ -125,8 +125,7 @@ def settled(measure: Callable[[], Usage], expected: Usage) -> Usage:
 )
 def test_restarts(restarts: int, peer: Peer, tmp_path: Path) -> None:
     text = SYSTEM.replace("PYTHON", sys.executable).replace("PROGRAMS", str(PROGRAMS))
-    (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "talker.py").write_text(TALKER, encoding="utf-8")
+    path = write_system(tmp_path, text, talker=TALKER)
 
     def restart(node: str) -> None:
         request = Restart((f"/{node}",))
@@ -135,7 +134,7 @@ def test_restarts(restarts: int, peer: Peer, tmp_path: Path) -> None:
         done = read_answer(response, request)
         assert done.success, done.message
 
-    with RunningSystem(str(tmp_path / "robot.yaml")) as system:
+    with RunningSystem(str(path)) as system:
         system.wait_for("3 of 3 nodes active")
         pid = system.process.pid
 

@@ -21,7 +21,7 @@ from tests.ros.process.test_restarts import PROGRAMS, SYSTEM, TALKER, Usage, chi
 from tests.ros.support.commands import compose, hand_written, running
 from tests.ros.support.dashboard import Dashboard
 from tests.ros.support.in_process import Peer, wait_until
-from tests.ros.support.system_process import PATIENCE_S, RunningSystem
+from tests.ros.support.system_process import PATIENCE_S, RunningSystem, write_system
 
 #: Restarts of everything, several times as often as the system waits before the next one.
 RESTARTS = "{max_attempts: 10000, window_ms: 3600000, backoff_ms: 20, backoff_max_ms: 200}"
@@ -85,9 +85,8 @@ def test_kills_of_any_process(seconds: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     text = SYSTEM.replace("PYTHON", sys.executable).replace("PROGRAMS", str(PROGRAMS))
     text += f"lifecycle: {{on_failure: restart, restart: {RESTARTS}}}\n"
-    (tmp_path / "robot.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "talker.py").write_text(TALKER, encoding="utf-8")
-    with RunningSystem(str(tmp_path / "robot.yaml"), "--dashboard") as system:
+    path = write_system(tmp_path, text, talker=TALKER)
+    with RunningSystem(str(path), "--dashboard") as system:
         system.wait_for("3 of 3 nodes active")
         pid = system.process.pid
         dashboard = Dashboard()
@@ -193,9 +192,7 @@ MAX_LOG_LINES_PER_S = 20
 @pytest.mark.timeout(300)
 def test_hostile_neighbors_stop_nothing(tmp_path: Path, peer: Peer) -> None:
     duration_s = 120.0
-    path = tmp_path / "hardy.yaml"
-    path.write_text(HARDY, encoding="utf-8")
-    path.with_suffix(".py").write_text(TICKER, encoding="utf-8")
+    path = write_system(tmp_path, HARDY, hardy=TICKER)
     with running(tmp_path / "log", str(path)) as system, ExitStack() as neighbors:
         system.wait_for("1 of 2 nodes active")
         longest = peer.listen(Float64, "/longest")

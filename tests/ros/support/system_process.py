@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from textwrap import dedent
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -28,6 +29,15 @@ T = TypeVar("T")
 REPOSITORY = Path(__file__).resolve().parents[3]
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
 PATIENCE_S = 60.0
+
+
+def write_system(folder: Path, text: str, **modules: str) -> Path:
+    """Write a system, and ``modules`` as Python files next to it; return its path."""
+    for name, content in modules.items():
+        folder.joinpath(f"{name}.py").write_text(dedent(content), encoding="utf-8")
+    path = folder / "system.yaml"
+    path.write_text(dedent(text), encoding="utf-8")
+    return path
 
 
 class RunningSystem:
