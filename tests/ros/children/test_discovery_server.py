@@ -23,6 +23,7 @@ from tests.ros.support.commands import (
 )
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.observers import Observer, observing
+from tests.ros.support.system_process import write_system
 
 SYSTEM = """
 system: robot
@@ -53,10 +54,7 @@ def port() -> int:
 
 def written(folder: Path, port: int, address: str = "127.0.0.1") -> Path:
     """Return the path of the system, which is written to ``folder``."""
-    path = folder / "robot.yaml"
-    text = SYSTEM.replace("127.0.0.1", address).format(port=port)
-    path.write_text(text, encoding="utf-8")
-    return path
+    return write_system(folder, SYSTEM.replace("127.0.0.1", address).format(port=port))
 
 
 @pytest.fixture(scope="module")

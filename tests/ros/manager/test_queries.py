@@ -12,6 +12,7 @@ from composer.client.systems.local_queries import local_endpoints, local_paramet
 from composer.runtime.ros_graph.node_endpoints import endpoints
 from tests.ros.support.commands import Running, running
 from tests.ros.support.in_process import wait_until
+from tests.ros.support.system_process import write_system
 
 SYSTEM = """
 system: queried
@@ -30,8 +31,7 @@ def system(shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory) -> I
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")  # as the system
         folder = tmp_path_factory.mktemp("queried")
-        path = folder / "queried.yaml"
-        path.write_text(SYSTEM % ", ".join(["7"] * 20_001), encoding="utf-8")
+        path = write_system(folder, SYSTEM % ", ".join(["7"] * 20_001))
         with running(folder / "log", str(path)) as started:
             started.wait_for("3 of 3 nodes active")
             yield started
