@@ -87,7 +87,7 @@ def servers(port: int) -> list[int]:
 
 
 def wait_for_messages(observer: Observer, count: int) -> None:
-    """Wait until an observer has received so many messages."""
+    """Wait until an observer has received ``count`` messages."""
     until_s = time.monotonic() + PATIENCE_S
     while observer.ask()[0] < count:
         assert time.monotonic() < until_s
