@@ -161,6 +161,9 @@ def test_a_bring_up_over_processes_is_rolled_back(tmp_path: Path) -> None:
     assert "/lab/arm active" not in system.states()
 
 
+# The tests from here on share a robot. Those before them run systems of their own.
+
+
 @pytest.fixture(scope="module")
 def robot(
     shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory
