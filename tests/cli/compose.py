@@ -6,6 +6,7 @@ import contextlib
 import io
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 from composer.cli import main
 
@@ -34,3 +35,11 @@ def compose(*arguments: str) -> Done:
         code = main(list(arguments))
     assert sys.stdout is not out
     return Done(code, out.text(), err.text())
+
+
+def write_files(files: dict[str, str], folder: Path = Path()) -> None:
+    """Write texts by the names of their files, in new folders if need be."""
+    for name, text in files.items():
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 from tests.unit.support.fleets import fleet_text
 
 PIPELINE = "systems/pipeline.yaml"
+PIPELINE_FILE = str(Path(PIPELINE).resolve())
 
 
 def test_the_default_is_a_mermaid_diagram_on_stdout() -> None:
@@ -20,45 +21,38 @@ def test_the_default_is_a_mermaid_diagram_on_stdout() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "begin"),
+    ("name", "options", "begin"),
     [
-        ("p.svg", "<svg "),
-        ("p.JSON", "{\n"),
-        ("p.mmd", "---\n"),
-        ("p.html", "<!DOCTYPE html>\n"),
+        ("p.svg", (), "<svg "),
+        ("p.JSON", (), "{\n"),
+        ("p.mmd", (), "---\n"),
+        ("p.html", (), "<!DOCTYPE html>\n"),
+        ("p.txt", ("-f", "json"), "{\n"),
+        ("itself.svg", (), "<svg "),
+        ("link.svg", (), "<svg "),
     ],
 )
-def test_the_file_suffix_selects_the_format(name: str, begin: str, tmp_path: Path) -> None:
-    target = tmp_path / name
-    done = compose("graph", PIPELINE, "-o", str(target))
-    assert (done.code, done.out, done.err) == (0, "", f"wrote {target}\n")
-    assert target.read_text(encoding="utf-8").startswith(begin)
+def test_the_file_suffix_or_an_option_selects_the_format(
+    name: str, options: tuple[str, ...], begin: str, folder: Path
+) -> None:
+    Path("itself.svg").symlink_to("itself.svg")
+    Path("link.svg").symlink_to("target.svg")
+    done = compose("graph", PIPELINE_FILE, "-o", name, *options)
+    assert (done.code, done.out, done.err) == (0, "", f"wrote {name}\n")
+    assert Path(name).read_text(encoding="utf-8").startswith(begin)
+    assert Path("itself.svg").is_symlink() == (name != "itself.svg")
+    assert Path("target.svg").exists() == (name == "link.svg")
 
 
-def test_an_unknown_file_suffix_is_a_usage_error(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     done = compose("graph", PIPELINE, "-o", str(tmp_path / "p.doc"))
     assert done.code == 2
     assert ".svg" in done.err
-
-
-def test_the_format_option_overrides_the_suffix(tmp_path: Path) -> None:
-    target = tmp_path / "p.txt"
-    assert compose("graph", PIPELINE, "-o", str(target), "-f", "json").code == 0
-    assert target.read_text(encoding="utf-8").startswith("{\n")
-
-
-def test_an_unwritable_file_is_reported(tmp_path: Path) -> None:
     done = compose("graph", PIPELINE, "-o", str(tmp_path / "no" / "p.svg"))
     assert done.code == 1
     assert "No such file or directory" in done.err
-
-
-def test_a_link_to_itself_is_replaced(tmp_path: Path) -> None:
-    target = tmp_path / "p.svg"
-    target.symlink_to(target.name)
-    done = compose("graph", PIPELINE, "-o", str(target))
-    assert (done.code, done.err) == (0, f"wrote {target}\n")
-    assert target.read_text(encoding="utf-8").startswith("<svg ")
+    done = compose("graph", PIPELINE, "-f", "svg", "-o", "/dev/null")
+    assert (done.code, done.err) == (0, "wrote /dev/null\n")
 
 
 def test_a_failed_write_leaves_the_file_as_it_was(
@@ -79,15 +73,6 @@ def test_a_failed_write_leaves_the_file_as_it_was(
     ]
 
 
-def test_a_diagram_goes_to_a_device_or_through_a_link(tmp_path: Path) -> None:
-    done = compose("graph", PIPELINE, "-f", "svg", "-o", "/dev/null")
-    assert (done.code, done.err) == (0, "wrote /dev/null\n")
-    (tmp_path / "link.svg").symlink_to("p.svg")
-    assert compose("graph", PIPELINE, "-o", str(tmp_path / "link.svg")).code == 0
-    assert (tmp_path / "link.svg").is_symlink()
-    assert (tmp_path / "p.svg").read_text(encoding="utf-8").startswith("<svg ")
-
-
 def test_views() -> None:
     done = compose("graph", PIPELINE, "--view", "lifecycle", "-f", "json")
     edges = json.loads(done.out)["edges"]
@@ -96,23 +81,16 @@ def test_views() -> None:
     ]
 
 
-def test_errors_are_marked_in_the_diagram(tmp_path: Path) -> None:
-    path = tmp_path / "broken.yaml"
-    path.write_text("system: broken\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n")
-    done = compose("graph", str(path))
+def test_a_system_with_errors_is_drawn_if_there_is_one(folder: Path) -> None:
+    write_files(
+        {"a.yaml": "system: a\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n", "b.yaml": "["}
+    )
+    done = compose("graph", "a.yaml")
     assert done.code == 0
     assert "class v1 wrong" in done.out
     assert "error[" in done.err
-
-
-def test_a_file_that_is_not_a_system_is_rejected(tmp_path: Path) -> None:
-    path = tmp_path / "broken.yaml"
-    path.write_text("[")
-    done = compose("graph", str(path))
+    done = compose("graph", "b.yaml")
     assert (done.code, done.out) == (1, "")
-
-
-def test_an_unknown_system_name_lists_the_examples() -> None:
     done = compose("graph", "pipelin")
     assert done.code == 2
     assert "did you mean 'pipeline'?" in done.err
@@ -133,22 +111,20 @@ def test_systems_and_live_are_mutually_exclusive() -> None:
         assert "--live" in done.err
 
 
-def test_a_diagram_too_large_for_mermaid_prints_a_warning(tmp_path: Path) -> None:
-    path = tmp_path / "large.yaml"
-    path.write_text(fleet_text(300))
-    done = compose("graph", str(path))
+def test_a_diagram_too_large_for_mermaid_prints_a_warning(folder: Path) -> None:
+    write_files({"large.yaml": fleet_text(300)})
+    done = compose("graph", "large.yaml")
     assert done.code == 0
     assert "Mermaid refuses to render a diagram of this size" in done.err
 
 
 @pytest.mark.parametrize("command", [("graph",), ("run", "--dry-run"), ("export", "launch")])
-def test_warnings_are_counted_and_errors_printed(tmp_path: Path, command: tuple[str, ...]) -> None:
-    system = tmp_path / "s.yaml"
+def test_warnings_are_counted_and_errors_printed(folder: Path, command: tuple[str, ...]) -> None:
     text = "system: s\nnodes:\n  b: {on_activate: {log: hi}}  # compose: ignore[qos-implicit]\n"
-    system.write_text(text)
-    done = compose(*command, str(system))
-    assert (done.code, done.err) == (0, f"1 warning: see 'compose validate {system}'\n")
-    system.write_text(f"{text}  c: {{lifecycle: {{depends_on: [d]}}}}\n")
-    done = compose(*command, str(system))
+    write_files({"s.yaml": text})
+    done = compose(*command, "s.yaml")
+    assert (done.code, done.err) == (0, "1 warning: see 'compose validate s.yaml'\n")
+    write_files({"s.yaml": f"{text}  c: {{lifecycle: {{depends_on: [d]}}}}\n"})
+    done = compose(*command, "s.yaml")
     assert "error[RC202 unknown-node]" in done.err
     assert "warning[" not in done.err

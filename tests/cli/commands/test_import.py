@@ -7,14 +7,11 @@ from pathlib import Path
 import pytest
 
 from composer.cli.commands.import_nodes import why_too_large
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 
-def test_names_that_ros_does_not_accept_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("driver.py").write_text("from rclpy.node import Node\nclass Driver(Node):\n    pass\n")
+def test_a_file_that_would_not_be_valid_is_refused_or_noted(folder: Path) -> None:
+    write_files({"driver.py": "from rclpy.node import Node\nclass Driver(Node):\n    pass\n"})
     for arguments in (
         ("class", "driver:Driver", "-o", "my driver.yaml"),
         ("live", "--system", "my driver"),
@@ -22,14 +19,7 @@ def test_names_that_ros_does_not_accept_are_refused(
         done = compose("import", *arguments)
         assert (done.code, done.out) == (2, "")
         assert "the name 'my driver' contains a space" in done.err
-    assert [path.name for path in tmp_path.iterdir()] == ["driver.py"]
-
-
-def test_a_module_that_the_new_file_does_not_find_is_noted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("driver.py").write_text("from rclpy.node import Node\nclass Driver(Node):\n    pass\n")
+    assert [path.name for path in folder.iterdir()] == ["driver.py"]
     note = "note: the module 'driver' is not found from other/driver.yaml: move it next to"
     assert note in compose("import", "class", "driver:Driver", "-o", "other/driver.yaml").err
     done = compose("import", "class", "driver:Driver", "-o", "driver.yaml")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 PIPELINE = "systems/pipeline.yaml"
 
@@ -25,41 +25,35 @@ def test_options_change_the_plan() -> None:
     assert "activate" not in done.out
     assert "#1 configure /robot1/perception/sensor_simulator: " in done.out
     assert compose("run", PIPELINE, "--dry-run", "--autostart", "unconfigured").out == ""
+    assert compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
+    done = compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocty=1.0")
+    assert done.code == 78
+    assert "did you mean 'max_velocity'?" in done.err
 
 
 @pytest.mark.parametrize("comment", ["", "  # compose: ignore[unknown-node] two will come"])
 def test_a_system_with_errors_is_rejected_even_with_ignore_comments(
-    comment: str, tmp_path: Path
+    comment: str, folder: Path
 ) -> None:
-    path = tmp_path / "broken.yaml"
-    path.write_text(
-        f"system: broken\nnodes:\n  one: {{lifecycle: {{depends_on: [two]}}}}{comment}\n"
-    )
-    done = compose("run", str(path), "--dry-run")
+    nodes = f"nodes:\n  one: {{lifecycle: {{depends_on: [two]}}}}{comment}\n"
+    write_files({"broken.yaml": f"system: broken\n{nodes}"})
+    done = compose("run", "broken.yaml", "--dry-run")
     assert (done.code, done.out) == (78, "")
     assert "is not a node of this system" in done.err
 
 
-def test_parameter_overrides_are_validated() -> None:
-    done = compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocty=1.0")
-    assert done.code == 78
-    assert "did you mean 'max_velocity'?" in done.err
-    assert compose("run", PIPELINE, "--dry-run", "--set", "planner.max_velocity=0.5").code == 0
-
-
-def test_paths_that_are_not_files_are_reported(tmp_path: Path) -> None:
-    assert compose("run", str(tmp_path)).code == 2
-    os.mkfifo(tmp_path / "pipe.yaml")
-    assert "expected a file, found a pipe" in compose("run", str(tmp_path / "pipe.yaml")).err
+def test_paths_that_are_not_files_are_reported(folder: Path) -> None:
+    assert compose("run", ".").code == 2
+    os.mkfifo("pipe.yaml")
+    assert "expected a file, found a pipe" in compose("run", "pipe.yaml").err
     done = compose("run", "a" * 5000)
     assert (done.code, done.out) == (78, "")
     assert "this file cannot be read: File name too long" in done.err
 
 
-def test_one_process_alone_starts_no_other(tmp_path: Path) -> None:
-    path = tmp_path / "robot.yaml"
-    path.write_text("system: robot\nprocesses: {a: {nodes: [b]}}\nnodes: {b: {}}\n")
-    done = compose("run", str(path), "--process", "a", "--await-processes", "--dry-run")
+def test_one_process_alone_starts_no_other(folder: Path) -> None:
+    write_files({"robot.yaml": "system: robot\nprocesses: {a: {nodes: [b]}}\nnodes: {b: {}}\n"})
+    done = compose("run", "robot.yaml", "--process", "a", "--await-processes", "--dry-run")
     assert (done.code, done.out) == (2, "")
     assert "--await-processes cannot be used with --process" in done.err
 

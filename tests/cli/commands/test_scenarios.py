@@ -6,21 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 SCENARIO = "scenario: starts\nsystem: ../minimal.yaml\nfor_s: 1\nexpect: [{log: started}]\n"
 
 
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    (tmp_path / "composer.yaml").touch()
-    (tmp_path / "scenarios").mkdir()
-    (tmp_path / "minimal.yaml").write_text(
-        "system: minimal\nnodes: {node: {on_activate: {log: started}}}\n"
+def project(folder: Path) -> None:
+    write_files(
+        {
+            "composer.yaml": "",
+            "minimal.yaml": "system: minimal\nnodes: {node: {on_activate: {log: started}}}\n",
+            "scenarios/starts.yaml": SCENARIO,
+            "empty/note.txt": "",
+        }
     )
-    (tmp_path / "scenarios" / "starts.yaml").write_text(SCENARIO)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 @pytest.mark.parametrize(
@@ -35,22 +35,20 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["--explore", "5", "--repeat", "2"], "--explore runs each variation once"),
     ],
 )
-def test_usage_error(project: Path, arguments: list[str], message: str) -> None:
-    (project / "empty").mkdir()
+@pytest.mark.usefixtures("project")
+def test_usage_error(arguments: list[str], message: str) -> None:
     done = compose("test", *arguments)
     assert done.code == 2
     assert message in done.err
 
 
-def test_run_of_a_scenario_names_the_command(project: Path) -> None:
+@pytest.mark.usefixtures("project")
+def test_run_names_the_command_and_validate_checks_the_scenarios_of_a_folder() -> None:
     done = compose("run", "scenarios/starts.yaml", "--dry-run")
     assert done.code == 78
     assert "'scenarios/starts.yaml' is a scenario, not a system" in done.err
     assert "compose test scenarios/starts.yaml" in done.err
-
-
-def test_scenarios_of_a_folder_are_validated(project: Path) -> None:
-    (project / "scenarios" / "starts.yaml").write_text(SCENARIO.replace("log:", "message:"))
+    write_files({"scenarios/starts.yaml": SCENARIO.replace("log:", "message:")})
     done = compose("validate", ".")
     assert done.code == 1
     assert "no node publishes '/started'" in done.out

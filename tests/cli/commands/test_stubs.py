@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from composer.python_code.stubs.folder import HEADER
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 TYPED = "typings/composer/typed.pyi"
 #: A system with a node that has a behavior and ports of its own.
@@ -27,17 +27,20 @@ nodes:
 
 
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
+def project(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     assert compose("new", "project", "my_robot").code == 0
-    monkeypatch.chdir(tmp_path / "my_robot")
-    return tmp_path / "my_robot"
+    monkeypatch.chdir(folder / "my_robot")
+    return folder / "my_robot"
 
 
 def contents(folder: Path) -> dict[str, bytes]:
     """Return the files below a folder, with their contents."""
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def change(path: Path, before: str, after: str) -> None:
+    path.write_text(path.read_text().replace(before, after, 1))
 
 
 def classes(project: Path) -> list[str]:
@@ -67,23 +70,18 @@ def test_a_behavior_runs_and_is_tested_without_the_stubs(project: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "tests/test_counter_node.py"]
     done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
-    assert (
-        "from composer.typed import CounterBehavior" in (project / "nodes/counter.py").read_text()
-    )
+    code = (project / "nodes/counter.py").read_text()
+    assert "from composer.typed import CounterBehavior" in code
     assert compose("validate", "--strict", ".").code == 0
 
 
-def test_only_the_given_systems_add_classes(project: Path) -> None:
+def test_the_output_depends_on_the_given_files_only(project: Path) -> None:
     (project / "systems/extra.yaml").write_text(SYSTEM)
     done = compose("stubs", "systems/my_robot.yaml", "-o", "elsewhere")
     assert done.code == 0, done.err
     assert not (project / "typings").exists()
     (project / "elsewhere").rename(project / "typings")
     assert classes(project) == ["CounterBehavior"]
-
-
-def test_the_output_depends_on_the_files_only(project: Path) -> None:
-    (project / "systems/extra.yaml").write_text(SYSTEM)
     written = []
     for seed in ("1", "2"):
         command = [sys.executable, "-P", "-m", "composer", "stubs", "-o", seed]
@@ -96,8 +94,7 @@ def test_the_output_depends_on_the_files_only(project: Path) -> None:
 def test_check_names_what_would_change(project: Path) -> None:
     assert compose("stubs").code == 0
     before = contents(project / "typings")
-    text = (project / "nodes/counter.yaml").read_text()
-    (project / "nodes/counter.yaml").write_text(text.replace("rate_hz:", "rate:", 1))
+    change(project / "nodes/counter.yaml", "rate_hz:", "rate:")
     done = compose("stubs", "--check")
     assert (done.code, done.out) == (1, f"{TYPED}\n")
     assert "'typings' is out of date" in done.err
@@ -109,30 +106,27 @@ def test_check_names_what_would_change(project: Path) -> None:
 
 def test_only_files_of_the_command_are_replaced_and_removed(project: Path) -> None:
     assert compose("stubs").code == 0
-    folder = project / "typings"
-    (folder / "mine.pyi").write_text("X: int\n")
-    (folder / "std_msgs/extra.pyi").write_text("Y: int\n")
-    (folder / "old_msgs").mkdir()
-    (folder / "old_msgs/msg.pyi").write_text(HEADER)
-    (folder / "rclpy/node.pyi").write_text("class Node: ...\n")
-    (folder / "std_msgs/msg.pyi").write_text(HEADER + "changed\n")
+    kept = {
+        "mine.pyi": "X: int\n",
+        "std_msgs/extra.pyi": "Y: int\n",
+        "rclpy/node.pyi": "class Node: ...\n",
+    }
+    others = {"old_msgs/msg.pyi": HEADER, "std_msgs/msg.pyi": f"{HEADER}changed\n"}
+    write_files({**kept, **others}, project / "typings")
     done = compose("stubs")
     assert "note: 'typings/rclpy/node.pyi' is not a file of this command: it is kept" in done.err
     assert "'typings': 1 file written, 1 removed" in done.err
-    files = contents(folder)
-    assert files["mine.pyi"] == b"X: int\n"
-    assert files["std_msgs/extra.pyi"] == b"Y: int\n"
-    assert files["rclpy/node.pyi"] == b"class Node: ...\n"
-    assert not (folder / "old_msgs").exists()
+    files = contents(project / "typings")
+    assert {name: files[name].decode() for name in kept} == kept
+    assert not (project / "typings/old_msgs").exists()
     assert b"changed" not in files["std_msgs/msg.pyi"]
     assert compose("stubs", "--check").code == 0
 
 
 def test_symbolic_links_are_not_followed(project: Path, tmp_path: Path) -> None:
     outside = tmp_path / "outside"
-    (outside / "std_msgs").mkdir(parents=True)
-    (outside / "std_msgs/old.pyi").write_text(HEADER)
-    (outside / "file.pyi").write_text(HEADER)
+    write_files({"std_msgs/old.pyi": HEADER, "file.pyi": HEADER}, outside)
+    before = contents(outside)
     folder = project / "typings"
     (folder / "rclpy").mkdir(parents=True)
     (folder / "std_msgs").symlink_to(outside / "std_msgs")
@@ -141,10 +135,7 @@ def test_symbolic_links_are_not_followed(project: Path, tmp_path: Path) -> None:
     done = compose("stubs")
     assert done.code == 0, done.err
     assert "'typings/std_msgs/msg.pyi' is not a file of this command: it is kept" in done.err
-    assert contents(outside) == {
-        "std_msgs/old.pyi": HEADER.encode(),
-        "file.pyi": HEADER.encode(),
-    }
+    assert contents(outside) == before
     assert (folder / "stale.pyi").is_symlink()
 
 
@@ -185,10 +176,8 @@ def test_validate_and_run_update_the_folder(project: Path, command: tuple[str, .
     assert not (project / "typings").exists()
     assert compose("stubs").code == 0
     assert "typings" not in compose(*command).err
-    text = (project / "nodes/counter.yaml").read_text()
-    (project / "nodes/counter.yaml").write_text(
-        text.replace("timers:", "  more: {type: std_msgs/msg/Bool, external: true}\ntimers:")
-    )
+    more = "  more: {type: std_msgs/msg/Bool, external: true}\ntimers:"
+    change(project / "nodes/counter.yaml", "timers:", more)
     done = compose(*command)
     assert "'typings' is up to date again: 1 file written" in done.err
     assert "def more(self)" in (project / TYPED).read_text()
@@ -196,20 +185,19 @@ def test_validate_and_run_update_the_folder(project: Path, command: tuple[str, .
     assert compose("stubs", "--check").code == 0
 
 
-def test_the_folder_is_not_updated_while_a_node_type_cannot_be_read(project: Path) -> None:
+def test_a_folder_is_left_alone_without_stubs_or_while_a_node_type_cannot_be_read(
+    project: Path,
+) -> None:
+    write_files({TYPED: "class CounterBehavior: ...\n"})
+    assert "typings" not in compose("validate", ".").err
+    assert contents(project / "typings") == {"composer/typed.pyi": b"class CounterBehavior: ...\n"}
+    (project / TYPED).unlink()
     assert compose("stubs").code == 0
     (project / "nodes/counter.yaml").write_text("node: [\n")
     done = compose("validate", ".")
     assert done.code == 1
     assert "typings" not in done.err
     assert classes(project) == ["CounterBehavior"]
-
-
-def test_a_folder_without_stubs_is_left_alone(project: Path) -> None:
-    (project / "typings/composer").mkdir(parents=True)
-    (project / TYPED).write_text("class CounterBehavior: ...\n")
-    assert "typings" not in compose("validate", ".").err
-    assert contents(project / "typings") == {"composer/typed.pyi": b"class CounterBehavior: ...\n"}
 
 
 def test_a_folder_that_cannot_be_written_is_one_note(
@@ -223,30 +211,22 @@ def test_a_folder_that_cannot_be_written_is_one_note(
     monkeypatch.setattr(tempfile, "mkstemp", refuse)
     done = compose("validate", ".")
     assert done.code == 0
-    note = (
-        f"note: 'typings' was not updated: cannot write '{project / TYPED}': Read-only file system"
-    )
-    assert note in done.err.splitlines()
+    note = f"note: 'typings' was not updated: cannot write '{project / TYPED}': "
+    assert f"{note}Read-only file system" in done.err.splitlines()
     assert (compose("stubs").code, (project / TYPED).read_text()) == (1, HEADER)
 
 
-def test_a_file_in_the_place_of_the_folder_is_an_error(project: Path) -> None:
+def test_what_the_command_cannot_use_is_an_error(
+    project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert compose("stubs", "nowhere").code == 2
+    assert compose("stubs", "a" * 5000).code == 2
+    assert compose("stubs", "systems", str(tmp_path)).code == 2
     (project / "typings").write_text("")
     done = compose("stubs")
     assert done.code == 1
     assert "typings" in done.err
     assert "internal error" not in done.err
-
-
-def test_paths_must_exist_and_be_of_one_project(project: Path, tmp_path: Path) -> None:
-    assert compose("stubs", "nowhere").code == 2
-    assert compose("stubs", "a" * 5000).code == 2
-    assert compose("stubs", "systems", str(tmp_path)).code == 2
-
-
-def test_a_folder_without_a_project_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.chdir(tmp_path)
     done = compose("stubs")
     assert done.code == 2
