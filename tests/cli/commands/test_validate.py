@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 FINE = "system: fine\nnodes:\n  one: {}\n"
 BROKEN = """\
@@ -15,11 +15,6 @@ system: broken
 nodes:
   first: {lifecycle: {depends_on: [secnd]}}
   second: {}
-"""
-WARNED = """\
-system: warned
-nodes:
-  first: {type: nothing_of_the_kind}
 """
 TWISTED = """\
 system: twisted
@@ -29,28 +24,30 @@ nodes:
 """
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    Path("fine.yaml").write_text(FINE)
-    return tmp_path
+@pytest.fixture(autouse=True)
+def fine_file(folder: Path) -> None:
+    write_files({"fine.yaml": FINE})
 
 
-def test_a_file_without_problems_prints_nothing_to_stdout(folder: Path) -> None:
+def test_a_file_argument_is_always_checked() -> None:
     done = compose("validate", "fine.yaml")
     assert (done.code, done.out, done.err) == (0, "", "1 file checked: no problems found\n")
+    write_files({"other.yaml": "services: {}\n"})
+    done = compose("validate", "other.yaml")
+    assert done.code == 1
+    assert "other.yaml:1:1" in done.out
 
 
 @pytest.mark.parametrize("paths", [[], ["."]])
-def test_a_folder_is_searched_for_systems_and_node_types_only(
-    folder: Path, paths: list[str]
-) -> None:
-    Path("nodes").mkdir()
-    Path("nodes/camera.yaml").write_text("node: camera\n")
-    Path("fine.yaml").write_text("system: fine\nnodes:\n  one: {type: camera}\n")
-    Path(".github").mkdir()
-    Path(".github/workflow.yaml").write_text("on: push\n")
-    Path("compose.yaml").write_text("services: {}\n")
+def test_a_folder_is_searched_for_systems_and_node_types_only(paths: list[str]) -> None:
+    write_files(
+        {
+            "nodes/camera.yaml": "node: camera\n",
+            "fine.yaml": "system: fine\nnodes:\n  one: {type: camera}\n",
+            ".github/workflow.yaml": "on: push\n",
+            "compose.yaml": "services: {}\n",
+        }
+    )
     done = compose("validate", *paths)
     assert done.code == 0
     assert done.err == (
@@ -61,25 +58,16 @@ def test_a_folder_is_searched_for_systems_and_node_types_only(
 
 @pytest.mark.parametrize("is_absolute", [False, True])
 def test_problems_of_a_shared_node_type_are_reported_once(folder: Path, is_absolute: bool) -> None:
-    Path("nodes").mkdir()
-    Path("nodes/odd.yaml").write_text("node: odd\nports: {}\n")
+    write_files({"nodes/odd.yaml": "node: odd\nports: {}\n"})
     for name in ("first", "second"):
-        Path(f"{name}.yaml").write_text(f"system: {name}\nnodes: {{one: {{type: odd}}}}\n")
+        write_files({f"{name}.yaml": f"system: {name}\nnodes: {{one: {{type: odd}}}}\n"})
     done = compose("validate", "--format", "json", str(folder) if is_absolute else ".")
     files = [item["location"]["file"] for item in json.loads(done.out)["diagnostics"]]
     assert [file for file in files if file.endswith("odd.yaml")] == ["nodes/odd.yaml"]
 
 
-def test_a_file_argument_is_always_checked(folder: Path) -> None:
-    Path("other.yaml").write_text("services: {}\n")
-    done = compose("validate", "other.yaml")
-    assert done.code == 1
-    assert "other.yaml:1:1" in done.out
-
-
-def test_stdin_can_have_a_file_name(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    Path("robot/nodes").mkdir(parents=True)
-    Path("robot/nodes/wheel.yaml").write_text("node: wheel\n")
+def test_stdin_can_have_a_file_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    write_files({"robot/nodes/wheel.yaml": "node: wheel\n"})
     text = "system: robot\nnodes:\n  left: {type: wheel}\n  right: {type: whel}\n"
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
     done = compose("validate", "-", "--stdin-name", "robot/unsaved.yaml")
@@ -91,24 +79,26 @@ def test_stdin_can_have_a_file_name(folder: Path, monkeypatch: pytest.MonkeyPatc
     assert "<stdin>:3:36" in compose("validate", "-").out
 
 
-def test_arguments_are_given_as_to_run(folder: Path) -> None:
-    text = (
-        "system: a\narguments: {far: {choices: [x, y]}}\nnodes:\n  one: {if: far == 'y', typ: x}\n"
-    )
-    Path("a.yaml").write_text(text)
+def test_arguments_are_given_as_to_run() -> None:
+    arguments = "arguments: {far: {choices: [x, y]}}\n"
+    write_files({"a.yaml": f"system: a\n{arguments}nodes:\n  one: {{if: far == 'y', typ: x}}\n"})
     assert compose("validate", "a.yaml", "far=x").code == 0
     assert compose("validate", "a.yaml", "far=y").code == 1
     refused = compose("validate", "a.yaml", "far:=y")
     assert (refused.code, "write far=y" in refused.err) == (2, True)
 
 
-def test_project_settings_apply(folder: Path) -> None:
-    Path("composer.yaml").write_text("strict: true\nignore: [RC5]\nseverity: {RC231: info}\n")
-    Path("deep.yaml").write_text("system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n")
+def test_project_settings_apply() -> None:
+    write_files(
+        {
+            "composer.yaml": "strict: true\nignore: [RC5]\nseverity: {RC231: info}\n",
+            "deep.yaml": "system: deep\nnodes:\n  one: {namespace: a/b/c/d/e}\n",
+        }
+    )
     done = compose("validate", "deep.yaml")
     assert done.code == 0
     assert done.out.startswith("info[RC231 deep-namespace]")
-    Path("composer.yaml").write_text("strict: true\n")
+    write_files({"composer.yaml": "strict: true\n"})
     assert compose("validate", "deep.yaml").code == 1
     relaxed = compose("validate", "deep.yaml", "--no-strict", "--format", "json")
     assert [item["severity"] for item in json.loads(relaxed.out)["diagnostics"]] == ["warning"]
@@ -120,9 +110,8 @@ def test_project_settings_apply(folder: Path) -> None:
     assert compose("validate", "empty").code == 2
 
 
-def test_wrong_settings_are_reported_once(folder: Path) -> None:
-    Path("other.yaml").write_text(FINE)
-    Path("composer.yaml").write_text("ignore: [qos-implict]\nstrickt: true\n")
+def test_wrong_settings_are_reported_once() -> None:
+    write_files({"other.yaml": FINE, "composer.yaml": "ignore: [qos-implict]\nstrickt: true\n"})
     done = compose("validate", "fine.yaml", "other.yaml", "--format", "json")
     found = [
         (item["rule"], item["location"]["file"], item["location"]["line"], item["hint"])
@@ -146,9 +135,8 @@ def test_wrong_settings_are_reported_once(folder: Path) -> None:
         ("pipeline", "/pipeline.yaml'?"),  # the example system
     ],
 )
-def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path, written: str, hint: str) -> None:
-    Path("systems").mkdir()
-    Path("systems/robot.yaml").write_text(FINE)
+def test_a_path_that_does_not_exist_is_a_usage_error(written: str, hint: str) -> None:
+    write_files({"systems/robot.yaml": FINE})
     done = compose("validate", written)
     assert done.code == 2
     assert done.err.startswith(f"compose: there is no file or folder '{written}'\n")
@@ -158,7 +146,7 @@ def test_a_path_that_does_not_exist_is_a_usage_error(folder: Path, written: str,
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_unreadable_files_are_reported(folder: Path) -> None:
+def test_unreadable_files_are_reported() -> None:
     Path("secret").mkdir(mode=0)
     Path("other.yaml").touch(mode=0)
     done = compose("validate", ".")
@@ -170,14 +158,17 @@ def test_unreadable_files_are_reported(folder: Path) -> None:
         assert "Permission denied" in done.out + done.err
 
 
-def test_an_invalid_interface_definition_is_reported_with_its_location(folder: Path) -> None:
-    definition = Path("interfaces/arm/msg/Grip.msg")
-    definition.parent.mkdir(parents=True)
-    definition.write_text("# How firm.\nflaot64 force\n")
-    Path("interfaces/arm/package.xml").write_text("<package><name>arm</name></package>")
-    Path("composer.yaml").write_text("interfaces: [interfaces]\n")
+def test_an_invalid_interface_definition_is_reported_with_its_location() -> None:
+    definition = "interfaces/arm/msg/Grip.msg"
     port = "{type: arm/msg/Grip, qos: command, external: true}"
-    Path("arm.yaml").write_text(f"system: arm\nnodes: {{arm: {{subscriptions: {{a: {port}}}}}}}\n")
+    write_files(
+        {
+            definition: "# How firm.\nflaot64 force\n",
+            "interfaces/arm/package.xml": "<package><name>arm</name></package>",
+            "composer.yaml": "interfaces: [interfaces]\n",
+            "arm.yaml": f"system: arm\nnodes: {{arm: {{subscriptions: {{a: {port}}}}}}}\n",
+        }
+    )
     for done in (compose("validate", "arm.yaml"), compose("interface", "show", "arm/msg/Grip")):
         assert done.code == 1
         text = done.out + done.err
@@ -185,44 +176,30 @@ def test_an_invalid_interface_definition_is_reported_with_its_location(folder: P
         assert f"{definition}:2" in text
 
 
-@pytest.mark.parametrize("rule", ["RC301", "RC3", "qos-incompatible"])
-def test_rules_can_be_selected_and_ignored(folder: Path, rule: str) -> None:
-    Path("twisted.yaml").write_text(TWISTED)
+def test_rules_can_be_selected_and_ignored() -> None:
+    write_files({"twisted.yaml": TWISTED})
     (found,) = json.loads(compose("validate", "twisted.yaml", "--format", "json").out)[
         "diagnostics"
     ]
-    rule = {"RC301": found["code"], "RC3": found["code"][:3]}.get(rule, found["rule"])
-    assert compose("validate", "twisted.yaml", "--select", rule).code == 1
-    assert compose("validate", "twisted.yaml", "--ignore", rule).code == 0
+    assert found["rule"] == "qos-incompatible"
+    for rule in (found["code"], found["code"][:3], found["rule"]):
+        assert compose("validate", "twisted.yaml", "--select", rule).code == 1
+        assert compose("validate", "twisted.yaml", "--ignore", rule).code == 0
     assert compose("validate", "twisted.yaml", "--select", "RC0").code == 0
-
-
-def test_an_unknown_rule_is_a_usage_error_with_a_suggestion(folder: Path) -> None:
     done = compose("validate", "fine.yaml", "--ignore", "unknown-nod")
     assert done.code == 2
     assert done.err == "compose: no rule is named 'unknown-nod'\n  did you mean 'unknown-node'?\n"
 
 
-def test_github_actions_selects_github_annotations(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    Path("broken.yaml").write_text(BROKEN)
-    monkeypatch.setenv("GITHUB_ACTIONS", "true")
-    assert compose("validate", "broken.yaml").out.startswith("::error file=broken.yaml,line=3")
-    assert compose("validate", "broken.yaml", "--format", "text").out.startswith("error[")
-
-
-def test_sarif_output(folder: Path) -> None:
-    Path("broken.yaml").write_text(BROKEN)
+def test_the_environment_selects_the_format_and_colors(monkeypatch: pytest.MonkeyPatch) -> None:
+    write_files({"broken.yaml": BROKEN})
     log = json.loads(compose("validate", "broken.yaml", "-f", "sarif").out)
     assert log["version"] == "2.1.0"
     assert len(log["runs"][0]["results"]) == 1
-
-
-def test_colors_are_only_for_terminals_unless_forced(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    Path("broken.yaml").write_text(BROKEN)
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    assert compose("validate", "broken.yaml").out.startswith("::error file=broken.yaml,line=3")
+    assert compose("validate", "broken.yaml", "--format", "text").out.startswith("error[")
+    monkeypatch.delenv("GITHUB_ACTIONS")
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.delenv("FORCE_COLOR", raising=False)
     assert "\x1b[" not in compose("validate", "broken.yaml").out
@@ -236,10 +213,8 @@ def test_colors_are_only_for_terminals_unless_forced(
     ("options", "shown"),
     [((), 200), (("--max-diagnostics", "7"), 7), (("--max-diagnostics", "0"), 0)],
 )
-def test_text_has_a_maximum_of_diagnostics(
-    folder: Path, options: tuple[str, ...], shown: int
-) -> None:
-    Path("repeated.yaml").write_text("system: a\nnodes: {b: {}}\n" + "nodes: {}\n" * 300)
+def test_text_has_a_maximum_of_diagnostics(options: tuple[str, ...], shown: int) -> None:
+    write_files({"repeated.yaml": "system: a\nnodes: {b: {}}\n" + "nodes: {}\n" * 300})
     done = compose("validate", "repeated.yaml", *options)
     assert done.code == 1
     assert done.out.count("error[RC011 ") == (shown or 300)
