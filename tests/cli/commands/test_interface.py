@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from composer.cli.commands import interface
+from tests.cli.compose import compose, write_files
 
 
 def test_nested_messages_are_expanded_without_their_comments() -> None:
@@ -59,3 +61,40 @@ def test_an_unknown_name_gets_a_suggestion(words: tuple[str, ...], hint: str) ->
     done = compose("interface", *words)
     assert done.code == 1
     assert hint in done.err
+
+
+def test_packages_for_colcon_need_no_wheels(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pip has not installed ROS 2 there."""
+    monkeypatch.setattr(interface, "wheel_versions", dict)
+    assert compose("new", "interfaces", "my_msgs").code == 0
+    status = folder / "interfaces" / "my_msgs" / "msg" / "Status.msg"
+    status.write_text("geometry_msgs/Pose pose\n")
+    done = compose("interface", "build")
+    assert done.code == 1
+    assert "uses types of 'geometry_msgs', which pip has not installed" in done.err
+    assert "compose interface build my_msgs --generate FOLDER" in done.err
+    done = compose("interface", "build", "my_msgs", "--generate", "generated")
+    assert (done.code, done.out) == (0, "my_msgs: generated\n")
+    assert (folder / "generated" / "CMakeLists.txt").is_file()
+    assert not (folder / "generated" / "pyproject.toml").exists()
+    done = compose("interface", "build", "my_msgs", "--generate", "generated")
+    assert "'generated' exists already" in done.err
+    status.write_text("strng text\n")
+    done = compose("interface", "build")
+    assert "'strng' is neither a primitive type nor a message" in done.err
+    assert "Status.msg:1:1\n" in done.err
+
+
+def test_definitions_are_checked_before_anything_is_built(folder: Path) -> None:
+    write_files({"composer.yaml": "interfaces: [interfaces]\n"})
+    for name, definition in (("my_msgs", "Header header"), ("good_msgs", "float32 speed")):
+        package = f"<package><name>{name}</name></package>\n"
+        files = {"package.xml": package, "msg/Speed.msg": f"{definition}\n"}
+        write_files(files, folder / "interfaces" / name)
+    done = compose("interface", "build")
+    assert (done.code, done.out) == (1, "")
+    assert "interfaces/my_msgs/msg/Speed.msg:1:1\n" in done.err
+    assert "did you mean 'std_msgs/Header'?" in done.err
+    assert not Path("build").exists()
+    done = compose("interface", "build", "good_msgs", "--generate", "complete")
+    assert (done.code, done.out) == (0, "good_msgs: complete\n")

@@ -28,7 +28,7 @@ from composer.client.systems import local_queries
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.requests import GraphAnswer, GraphQuery, GraphView
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 
 def environment_of(words: tuple[str, ...]) -> dict[str, str]:
@@ -58,39 +58,29 @@ def test_a_program_of_its_own_completes() -> None:
     assert done.stdout.split() == ["--autostart"]
 
 
-def test_commands_options_and_choices_are_completed() -> None:
-    assert complete("gra") == ["graph"]
-    assert complete("lifecycle", "se") == ["set"]
-    assert complete("run", "--auto") == ["--autostart"]
-    assert complete("run", "pipeline", "--autostart", "in") == ["inactive"]
-
-
-def test_the_names_of_example_systems_are_completed() -> None:
-    assert complete("run", "pi") == ["pipeline"]
-
-
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (["run", "S", ""], ["sim=false", "sim=true", "lidar=sick", "lidar=ouster", "rate="]),
-        (["config", "S", "lidar=o"], ["lidar=ouster"]),
+        (["gra"], ["graph"]),
+        (["lifecycle", "se"], ["set"]),
+        (["run", "--auto"], ["--autostart"]),
+        (["run", "pipeline", "--autostart", "in"], ["inactive"]),
+        (["run", "pi"], ["pipeline"]),
+        (["run", "s.yaml", ""], ["sim=false", "sim=true", "lidar=sick", "lidar=ouster", "rate="]),
+        (["config", "s.yaml", "lidar=o"], ["lidar=ouster"]),
         # bash makes words of "lidar", "=" and what follows
-        (["run", "S", "lidar", "="], ["sick", "ouster"]),
-        (["run", "S", "lidar", "=", "ou"], ["ouster"]),
-        (["run", "S", "lidar", "=", "sick", "sim"], ["sim=false", "sim=true"]),
-        (["graph", "S", "lid"], ["lidar=sick", "lidar=ouster"]),
-        (["validate", "S", "lidar", "=", "o"], ["ouster"]),
+        (["run", "s.yaml", "lidar", "="], ["sick", "ouster"]),
+        (["run", "s.yaml", "lidar", "=", "ou"], ["ouster"]),
+        (["run", "s.yaml", "lidar", "=", "sick", "sim"], ["sim=false", "sim=true"]),
+        (["graph", "s.yaml", "lid"], ["lidar=sick", "lidar=ouster"]),
+        (["validate", "s.yaml", "lidar", "=", "o"], ["ouster"]),
         (["run", "missing.yaml", ""], []),
     ],
 )
-def test_arguments_of_a_system_are_completed(
-    tmp_path: Path, words: list[str], offered: list[str]
-) -> None:
-    path = tmp_path / "s.yaml"
-    path.write_text(
-        "system: s\narguments:\n  sim: false\n  lidar: {choices: [sick, ouster]}\n  rate: 5.0\n"
-    )
-    assert complete(*(str(path) if word == "S" else word for word in words)) == offered
+def test_words_are_completed(folder: Path, words: list[str], offered: list[str]) -> None:
+    arguments = "{sim: false, lidar: {choices: [sick, ouster]}, rate: 5.0}"
+    write_files({"s.yaml": f"system: s\narguments: {arguments}\n"})
+    assert complete(*words) == offered
 
 
 @pytest.fixture
@@ -152,14 +142,12 @@ def test_names(
     assert complete_names(typed) == offered
 
 
-def test_without_a_system_no_name_is_completed(
+def test_a_failure_or_no_system_completes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     assert complete_topic("/") == complete_node("") == []
 
-
-def test_a_failure_is_silent() -> None:
     @silent
     def broken(incomplete: str) -> list[str]:
         raise RuntimeError(incomplete)
@@ -178,12 +166,7 @@ def test_a_failure_is_silent() -> None:
         ("deep/x", []),
     ],
 )
-def test_paths_of_systems_are_completed(
-    typed: str, offered: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("deep").mkdir()
-    for name in ("here.yaml", "notes.txt", ".hidden.yaml", "deep/inner.yml"):
-        Path(name).touch()
+def test_paths_of_systems_are_completed(typed: str, offered: list[str], folder: Path) -> None:
+    write_files(dict.fromkeys(("here.yaml", "notes.txt", ".hidden.yaml", "deep/inner.yml"), ""))
     examples = complete_system(typed)[: -len(offered) or None] if typed == "" else []
     assert complete_system(typed) == [*examples, *offered]

@@ -30,9 +30,6 @@ def test_what_is_written_is_escaped(capsys: pytest.CaptureFixture[str]) -> None:
     say(HOSTILE)
     out, err = capsys.readouterr()
     assert out == err == "a\\x1b]0;b\\x07\n[ERROR] forged\\r\\u202ec\\x9b2J\n"
-
-
-def test_one_text_is_one_line() -> None:
     assert lines([HOSTILE, "next"]).split("\n")[1] == "next"
 
 
@@ -43,13 +40,8 @@ def test_columns_stay_aligned() -> None:
     assert hostile.index("x", column) == column
     assert wide == "\u4e16\u754c".ljust(column - 2) + "y"
     assert combined == "e\u0301".ljust(column + 1) + "z"
-
-
-def test_numbers_stay_aligned() -> None:
-    assert columns([("\u4e16", "1"), ("b", "10")], numbers_from=1).split("\n") == [
-        "\u4e16   1",
-        "b   10",
-    ]
+    numbers = columns([("\u4e16", "1"), ("b", "10")], numbers_from=1)
+    assert numbers.split("\n") == ["\u4e16   1", "b   10"]
 
 
 @pytest.mark.parametrize("options", [(), ("--show-types",)])
@@ -79,31 +71,22 @@ def test_texts_that_are_not_ascii_are_shown_as_they_are() -> None:
     assert as_json({"name": "\u4e16 caf\xe9"}) == '{"name": "\u4e16 caf\xe9"}'
 
 
-def test_a_hostile_drift_has_the_usual_lines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_commands_print_of_others_has_the_usual_lines(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     drift = Drift(DriftKind.EXTRA_NODE, HOSTILE, hint=HOSTILE)
     write(diff.event_text("drift", drift, json=False))
     assert len(capsys.readouterr().out.splitlines()) == 2
-
-
-def test_a_hostile_check_has_the_usual_lines() -> None:
     assert len(doctor.result_text(warning("graph", HOSTILE, HOSTILE)).split("\n")) == 2
-
-
-def test_a_hostile_topic_has_the_usual_lines() -> None:
     found = {"types": [HOSTILE], "publishers": [], "subscriptions": []}
     assert len(info_text(found, verbose=True).split("\n")) == 3
-
-
-def test_a_hostile_system_has_one_title() -> None:
     report: Any = SimpleNamespace(
         activity="up", message=HOSTILE, host=HOSTILE, pid="1", nodes=(), processes={}
     )
-    for text in (
-        ps.system_text(HOSTILE, None),
-        ps.system_text("/robot", report).partition("\nnode ")[0],
-    ):
-        assert is_safe(text)
-        assert "\n" not in text
+    titles = (ps.system_text(HOSTILE, None), ps.system_text("/robot", report))
+    for title in (titles[0], titles[1].partition("\nnode ")[0]):
+        assert is_safe(title)
+        assert "\n" not in title
 
 
 def test_a_message_in_the_log_starts_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

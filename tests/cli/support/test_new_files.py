@@ -24,27 +24,27 @@ def contents(root: Path) -> dict[str, str]:
 def test_new_files_are_written_with_their_folders(tmp_path: Path) -> None:
     write_files(tmp_path, {"a/b/c.yaml": "c", "d.yaml": "d"}, replace=False)
     assert contents(tmp_path) == {"a/": "", "a/b/": "", "a/b/c.yaml": "c", "d.yaml": "d"}
-    assert (tmp_path / "d.yaml").stat().st_mode & 0o777 == 0o666 & ~current_umask()
-
-
-def current_umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
-    return mask
+    assert (tmp_path / "d.yaml").stat().st_mode & 0o777 == 0o666 & ~mask
 
 
-def test_nothing_is_left_if_a_new_file_cannot_be_written(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("file/x.yaml", r"cannot write '.*file/x.yaml': Not a directory"),
+        ("link", "link' exists already"),  # exists() says no: it appears meanwhile
+    ],
+)
+def test_nothing_is_left_if_a_new_file_cannot_be_written(
+    tmp_path: Path, name: str, problem: str
+) -> None:
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(CommandError, match=r"cannot write '.*file/x.yaml': Not a directory"):
-        write_files(tmp_path, {"a/b/c.yaml": "c", "file/x.yaml": "x"}, replace=False)
-    assert contents(tmp_path) == {"file": "in the way"}
-
-
-def test_nothing_is_left_if_a_file_appears_meanwhile(tmp_path: Path) -> None:
-    (tmp_path / "there").symlink_to("nowhere")  # exists() says no
-    with pytest.raises(CommandError, match="there' exists already"):
-        write_files(tmp_path, {"a/b/c.yaml": "c", "there": "x"}, replace=False)
-    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    (tmp_path / "link").symlink_to("nowhere")
+    with pytest.raises(CommandError, match=problem):
+        write_files(tmp_path, {"a/b/c.yaml": "c", name: "x"}, replace=False)
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "link"]
+    assert (tmp_path / "file").read_text() == "in the way"
 
 
 @pytest.mark.parametrize("step", ["write", "place"])
