@@ -1,9 +1,12 @@
 from __future__ import annotations
 
 import os
+import random
 import re
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,9 +18,10 @@ from composer import cli
 from composer.cli.app import ELSEWHERE, application
 from composer.cli.program import INTERNAL
 from composer.cli.support.options import examples
-from tests.cli.compose import compose
+from tests.cli.compose import compose, write_files
 
 COMPOSE = [sys.executable, "-m", "composer"]
+REPOSITORY = Path(cli.__file__).parents[2]
 
 
 def test_version() -> None:
@@ -26,17 +30,17 @@ def test_version() -> None:
     assert done.out.startswith("compose ")
 
 
-def commands() -> Iterator[list[str]]:
+def commands() -> Iterator[tuple[list[str], Any]]:
     """Yield the words of every command, including groups and the program itself."""
     waiting: list[tuple[list[str], Any]] = [([], typer.main.get_command(application()))]
     while waiting:
         words, command = waiting.pop()
-        yield words
+        yield words, command
         inner = getattr(command, "commands", {})
         waiting += [([*words, name], item) for name, item in inner.items()]
 
 
-COMMANDS = list(commands())
+COMMANDS = [words for words, _ in commands()]
 GROUPS = [words for words in COMMANDS if any(words == others[:-1] for others in COMMANDS if others)]
 
 
@@ -95,32 +99,41 @@ def test_commands_that_query_the_graph_have_a_time_limit_and_json_output(group: 
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--bogus"], ["nothing"], ["run"], ["graph", "-f", "x", "y"]]
+    ("arguments", "message"),
+    [
+        (["--bogus"], "Error: "),
+        (["nothing"], "Error: "),
+        (["valdate"], "Did you mean 'validate'?"),
+        (["run"], "Error: "),
+        (["graph", "-f", "x", "y"], "Error: "),
+        *(
+            (["run", "a.yaml", option, value], f"'{option}': ")
+            for option in ("--for", "--timeout", "--grace")
+            for value in ("nan", "inf", "1e300")
+        ),
+    ],
 )
-def test_wrong_arguments_are_a_usage_error_on_stderr(arguments: list[str]) -> None:
+def test_wrong_arguments_are_a_usage_error_on_stderr(arguments: list[str], message: str) -> None:
     done = compose(*arguments)
     assert (done.code, done.out) == (2, "")
-    assert "Error: " in done.err
+    assert message in done.err
 
 
-@pytest.mark.parametrize("option", ["--for", "--timeout", "--grace"])
-@pytest.mark.parametrize("value", ["nan", "inf", "1e300"])
-def test_nan_infinity_and_huge_durations_are_usage_errors(option: str, value: str) -> None:
-    done = compose("run", "systems/pipeline.yaml", "--dry-run", option, value)
-    assert (done.code, done.out) == (2, "")
-    assert f"'{option}': " in done.err
-
-
-def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a command with redirections of a shell."""
-    line = f'exec "$@" {to}'
+def in_shell(line: str, *words: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a line of a shell, whose arguments are the words."""
     return subprocess.run(
-        ["sh", "-c", line, "sh", *COMPOSE, *arguments],
+        ["sh", "-c", line, "sh", *words],
         check=False,
         capture_output=True,
         text=True,
         timeout=100,
+        **options,
     )
+
+
+def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a command with redirections of a shell."""
+    return in_shell(f'exec "$@" {to}', *COMPOSE, *arguments)
 
 
 def test_standard_streams_can_be_closed() -> None:
@@ -138,54 +151,40 @@ def test_a_full_disk_is_not_an_internal_error(arguments: list[str]) -> None:
     assert done.stderr == "compose: cannot write the output: No space left on device\n"
 
 
-def test_a_removed_working_directory_is_reported(tmp_path: Path) -> None:
-    folder = tmp_path / "gone"
-    folder.mkdir()
-    python = f"{sys.executable} -P -m composer"
-    done = subprocess.run(
-        ["sh", "-c", f"rmdir ../gone && {python} validate ."],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[2])},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-    )
+def test_a_closed_pipe_ends_quietly() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    command = [*COMPOSE, "export", "schema", "system"]
+    done = subprocess.run(command, check=False, stdout=write, stderr=subprocess.PIPE, text=True)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_removed_working_directory_is_reported(folder: Path) -> None:
+    gone = folder / "gone"
+    gone.mkdir()
+    line = f"rmdir ../gone && {sys.executable} -P -m composer validate ."
+    done = in_shell(line, cwd=gone, env={**os.environ, "PYTHONPATH": str(REPOSITORY)})
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "compose: the current working directory does not exist anymore\n"
 
 
-def test_python_m_composer_imports_nothing_from_the_current_folder(tmp_path: Path) -> None:
-    (tmp_path / "signal.py").write_text("import sys\nsys.exit('imported')\n")
-    done = subprocess.run(
-        [*COMPOSE, "--version"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-    )
+def test_python_m_composer_imports_nothing_from_the_current_folder(folder: Path) -> None:
+    write_files({"signal.py": "import sys\nsys.exit('imported')\n"})
+    done = redirected("", "--version")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("compose ")
 
 
+@pytest.mark.parametrize("is_in_c_code", [False, True])
 def test_ctrl_c_is_handled_while_a_command_is_imported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("composer.cli.app.application", interrupt)
-    done = compose("validate", ".")
-    assert (done.code, done.out, done.err) == (130, "", "")
-
-
-def test_an_import_error_caused_by_ctrl_c_is_an_interrupt(
-    monkeypatch: pytest.MonkeyPatch,
+    is_in_c_code: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The C extension of rclpy turns a KeyboardInterrupt during import into an ImportError."""
 
     def interrupt(*_: object) -> None:
+        if not is_in_c_code:
+            raise KeyboardInterrupt
         failure = ImportError("initialization failed")
         failure.__cause__ = KeyboardInterrupt()
         raise ImportError("read the guide") from failure
@@ -195,24 +194,42 @@ def test_an_import_error_caused_by_ctrl_c_is_an_interrupt(
     assert (done.code, done.out, done.err) == (130, "", "")
 
 
-def options_with_a_number() -> Iterator[tuple[str, Any]]:
-    waiting: list[tuple[str, Any]] = [("compose", typer.main.get_command(application()))]
-    while waiting:
-        name, command = waiting.pop()
-        waiting += [(f"{name} {word}", it) for word, it in getattr(command, "commands", {}).items()]
-        for option in command.params:
-            if option.type.name.startswith("float"):
-                yield f"{name} {option.opts[0]}", option
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [["--version"], ["validate", "systems"], ["dashboard", "--port", "0"]],
+    ids=lambda words: words[0],
+)
+def test_ctrl_c_in_the_first_moments_prints_no_traceback_of_ours(words: list[str]) -> None:
+    """Before our first line, Python itself prints where it was: see decision 0012."""
+    seed = random.randrange(2**32)
+    chance = random.Random(seed)
+    for _ in range(6):
+        delay_s = chance.uniform(0.0, 0.3)
+        with subprocess.Popen(
+            [Path(sys.executable).with_name("compose"), *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            time.sleep(delay_s)  # the moment is what is tested
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=60.0)
+        case = f"{delay_s:.3f} s, seed {seed}: exit code {process.returncode}\n{errors}"
+        files = {Path(name) for name in re.findall(r'File "(/.+?)"', errors)}
+        assert not any(file.is_relative_to(REPOSITORY / "composer") for file in files), case
+        assert process.returncode in (0, 1, 130, -signal.SIGINT), case
 
 
 def test_no_option_accepts_nan() -> None:
-    found = dict(options_with_a_number())
+    found = {
+        f"{' '.join(words)} {option.opts[0]}": option
+        for words, command in commands()
+        for option in command.params
+        if option.type.name.startswith("float")
+    }
     assert len(found) > 10
     assert [name for name, option in found.items() if option.callback is None] == []
-
-
-def test_a_mistyped_command_gets_a_suggestion() -> None:
-    assert "Did you mean 'validate'?" in compose("valdate").err
 
 
 @pytest.mark.parametrize(("word", "ours"), ELSEWHERE.items())
@@ -224,56 +241,77 @@ def test_a_command_of_another_tool_gets_the_name_of_ours(word: str, ours: str) -
 
 
 def test_an_internal_error_prints_a_traceback_only_on_request(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, folder: Path
 ) -> None:
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("out of\x1b[2J\npaper")
 
     monkeypatch.delenv("COMPOSE_DEBUG", raising=False)
     monkeypatch.setattr("composer.loading.load_files", fail)
-    (tmp_path / "any.yaml").write_text("system: any\n")
-    done = compose("validate", str(tmp_path / "any.yaml"))
+    write_files({"any.yaml": "system: any\n"})
+    done = compose("validate", "any.yaml")
     assert done.code == INTERNAL
     assert done.err.startswith("compose: internal error: RuntimeError: out of\\x1b[2J\\npaper\n")
     assert "Traceback" not in done.err
     monkeypatch.setenv("COMPOSE_DEBUG", "1")
-    assert "Traceback" in compose("validate", str(tmp_path / "any.yaml")).err
+    assert "Traceback" in compose("validate", "any.yaml").err
 
 
-def test_a_closed_pipe_ends_quietly() -> None:
-    read, write = os.pipe()
-    os.close(read)
-    done = subprocess.run(
-        [*COMPOSE, "export", "schema", "system"],
-        check=False,
-        stdout=write,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    os.close(write)
-    assert (done.returncode, done.stderr) == (141, "")
-
-
-def test_help_and_version_import_nothing_heavy() -> None:
+@pytest.mark.parametrize(
+    ("commands", "heavy", "printed"),
+    [
+        (
+            (["--version"], ["--help"]),
+            {"rclpy", "jsonschema", "yaml", "composer.loading", "composer.runtime", "rich"},
+            "",
+        ),
+        (
+            (["validate", "systems/pipeline.yaml"],),
+            {"rclpy", "jsonschema", "importlib.metadata", "importlib.resources", "email", "socket"}
+            | {"sysconfig", "asyncio", "rich", "composer.runtime", "composer.graph"},
+            "1 file checked: no problems found\n",
+        ),
+    ],
+    ids=["help and version", "validate"],
+)
+def test_only_what_is_needed_is_imported(
+    commands: tuple[list[str], ...], heavy: set[str], printed: str
+) -> None:
     code = (
-        "import sys; from composer.cli import main; main(['--version']); main(['--help']);"
-        "heavy = {'rclpy', 'jsonschema', 'yaml', 'composer.loading', 'composer.runtime', 'rich'};"
-        "print(heavy & set(sys.modules), file=sys.stderr)"
+        "import sys; from composer.cli import main\n"
+        f"for words in {commands!r}: main(words)\n"
+        f"print({heavy!r} & set(sys.modules), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr == "set()\n"
-
-
-def test_validate_imports_only_what_it_needs() -> None:
-    code = (
-        "import sys; from composer.cli import main; main(['validate', 'systems/pipeline.yaml']);"
-        "heavy = {'rclpy', 'jsonschema', 'importlib.metadata', 'importlib.resources', 'email',"
-        " 'socket', 'sysconfig', 'asyncio', 'rich', 'composer.runtime', 'composer.graph'};"
-        "print(heavy & set(sys.modules), file=sys.stderr)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr == "1 file checked: no problems found\nset()\n"
+    assert done.stderr == f"{printed}set()\n"
 
 
 def test_examples_are_printed_verbatim() -> None:
     assert examples("compose a", "compose b") == "\b\nExamples:\n  compose a\n  compose b"
+
+
+#: Commands that need a system without errors, with their exit codes for other files.
+NEED_A_SYSTEM = [
+    ("diff", 1),
+    ("doctor", 1),
+    ("export launch", 1),
+    ("dashboard", 1),
+    ("run --dry-run", 78),
+    ("hosts discovery-server", 78),
+]
+
+
+@pytest.mark.parametrize(("command", "code"), NEED_A_SYSTEM)
+def test_a_file_with_errors_or_of_a_node_type_is_rejected(
+    command: str, code: int, folder: Path
+) -> None:
+    if command == "dashboard":
+        pytest.importorskip("starlette", reason="the extra 'dashboard' is not installed")
+    text = "system: broken\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n"
+    write_files({"broken.yaml": text, "relay.yaml": "node: relay\n"})
+    done = compose(*command.split(), "broken.yaml")
+    assert (done.code, done.out) == (code, "")
+    assert done.err.startswith("error[")
+    done = compose(*command.split(), "relay.yaml")
+    assert (done.code, done.out) == (code, "")
+    assert "'relay.yaml' is a node type, not a system" in done.err
