@@ -8,13 +8,12 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from composer.client.run_log import Record
-from tests.cli.compose import Done, compose
+from tests.cli.compose import Done, compose, write_files
 
 #: In folders that only root can enter, the other user could not run any command.
 PRIVATE = [
@@ -50,10 +49,7 @@ VALIDATE = ("validate", "systems", "nodes")
 def make_project() -> Path:
     path = Path(tempfile.mkdtemp())
     path.chmod(0o755)
-    for name, text in FILES.items():
-        file = path / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8")
+    write_files(FILES, path)
     return path
 
 
@@ -67,26 +63,19 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     shutil.rmtree(path)
 
 
-@contextmanager
-def other_user() -> Iterator[None]:
-    """Be a user who owns nothing here."""
-    os.seteuid(OTHER_USER)
-    try:
-        yield
-    finally:
-        os.seteuid(0)
-
-
 def compose_as_other(*words: str) -> Done:
-    """Run a command as another user, who could not import its modules."""
+    """Run a command as a user who owns nothing here, and could not import its modules."""
     folder = Path.cwd()
     other = make_project()
     os.chdir(other)
     compose(*words)
     os.chdir(folder)
     shutil.rmtree(other)
-    with other_user():
+    os.seteuid(OTHER_USER)
+    try:
         return compose(*words)
+    finally:
+        os.seteuid(0)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,11 @@ from composer.cli.support.errors import CommandError
 from composer.cli.support.process import run_in_background
 
 
+@pytest.fixture(autouse=True)
+def log_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+
+
 @pytest.mark.parametrize(
     ("before", "limit_s"),
     [
@@ -25,7 +30,6 @@ from composer.cli.support.process import run_in_background
 def test_a_process_that_does_not_report_is_killed(
     before: str, limit_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     # Imported when Python starts, so the process always hangs.
     hang = f"import os, time\n{before}\ntime.sleep(60.0)\n"
     (tmp_path / "sitecustomize.py").write_text(hang)
@@ -39,22 +43,10 @@ def test_a_process_that_does_not_report_is_killed(
     assert raised.value.exit_code == 1
 
 
-def test_a_process_that_ends_early_is_reported_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+def test_a_process_that_ends_early_is_reported_at_once(folder: Path) -> None:
+    """It imports nothing from the current folder."""
+    (folder / "signal.py").write_text("import sys\nsys.exit('imported')\n")
     with pytest.raises(CommandError, match=re.escape("did not come up (exit code 2)")) as raised:
-        run_in_background("nothing", ["nothing"], 60.0)
-    assert "nothing" in raised.value.text()
-
-
-def test_the_process_imports_nothing_from_the_current_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
-    (tmp_path / "signal.py").write_text("import sys\nsys.exit('imported')\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(CommandError, match="did not come up") as raised:
         run_in_background("nothing", ["nothing"], 60.0)
     assert "there is no file 'nothing'" in raised.value.text()
 

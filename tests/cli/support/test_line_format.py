@@ -41,35 +41,29 @@ def test_tokens_are_replaced_as_by_rcutils(text: str, expected: str) -> None:
     assert LineFormat(text).render(LINE) == expected
 
 
-def test_without_a_format_lines_begin_with_the_elapsed_time() -> None:
-    stream = io.StringIO()
-    progress = Progress(stream)
-    progress.show(Logged(1.5, "planner", LogLevel.WARN, "no map"))
-    progress.show(BroughtUp(2.0, 3, 3))
-    assert stream.getvalue() == (
+def test_lines_begin_with_the_elapsed_time_or_have_the_format_of_the_user(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def printed() -> str:
+        stream = io.StringIO()
+        progress = Progress(stream, console_format())
+        progress.show(Logged(1.5, "planner", LogLevel.WARN, "no map"))
+        progress.show(BroughtUp(2.0, 3, 3))
+        return stream.getvalue()
+
+    monkeypatch.delenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", raising=False)
+    assert console_format() is None
+    assert printed() == (
         "[1.500] [WARN] [planner] no map\n"
         "[2.000] [INFO] [compose] 3 of 3 nodes active after 2.00 s\n"
     )
-
-
-def test_the_format_of_the_user_applies_to_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", "{severity} {name}: {message}")
-    stream = io.StringIO()
-    progress = Progress(stream, console_format())
-    progress.show(Logged(1.5, "planner", LogLevel.WARN, "no map"))
-    progress.show(BroughtUp(2.0, 3, 3))
-    assert stream.getvalue() == (
-        "WARN planner: no map\nINFO compose: 3 of 3 nodes active after 2.00 s\n"
-    )
-    assert file_format() == "{severity} {name}: {message}"
-
-
-def test_log_files_have_the_date_and_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", raising=False)
-    assert console_format() is None
+    # Log files have the date and time.
     assert LineFormat(file_format()).render(LINE) == (
         "[2023-11-14 22:13:20.012] [WARN] [robot.planner] no {name} yet"
     )
+    monkeypatch.setenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", "{severity} {name}: {message}")
+    assert printed() == "WARN planner: no map\nINFO compose: 3 of 3 nodes active after 2.00 s\n"
+    assert file_format() == "{severity} {name}: {message}"
 
 
 def test_counts_of_nodes_outside_the_process_are_not_known() -> None:

@@ -9,18 +9,17 @@ import pytest
 
 from composer.cli.support.errors import UsageError
 from composer.cli.support.system_arguments import complete_system, example_systems, system_file
+from tests.cli.compose import write_files
 
 OWN = "system: robot\nnodes:\n  one: {on_activate: {log: started}}\n"
 
 
 @pytest.fixture
-def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def root(folder: Path) -> Path:
     """Return the root of a project with the system ``robot``; it is the current folder."""
-    (tmp_path / "systems").mkdir()
-    (tmp_path / "nodes").mkdir()
-    (tmp_path / "systems" / "robot.yaml").write_text(OWN)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    (folder / "nodes").mkdir()
+    write_files({"systems/robot.yaml": OWN})
+    return folder
 
 
 def test_a_system_of_the_project_comes_before_an_example(
@@ -44,14 +43,6 @@ def test_it_is_found_from_every_folder_of_the_project(
     assert "mine" in complete_system("mi")
 
 
-def test_an_example_is_found_next_to_a_folder_of_its_name(root: Path) -> None:
-    (root / "pipeline").mkdir()
-    (root / "other").mkdir()
-    assert system_file("pipeline") == example_systems()["pipeline"]
-    with pytest.raises(UsageError, match="'other' is a folder"):
-        system_file("other")
-
-
 @pytest.mark.parametrize(
     ("text", "hint"),
     [("robt", "did you mean 'robot'?"), ("node", "example systems: "), ("", "None")],
@@ -60,6 +51,10 @@ def test_a_hint_names_no_folder(root: Path, text: str, hint: str) -> None:
     with pytest.raises(UsageError) as raised:
         system_file(text)
     assert str(raised.value.hint).startswith(hint)
+    (root / "pipeline").mkdir()
+    assert system_file("pipeline") == example_systems()["pipeline"]
+    with pytest.raises(UsageError, match="'nodes' is a folder"):
+        system_file("nodes")
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
