@@ -11,10 +11,12 @@ from typing import Any
 import rclpy
 from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
+
+from tests.ros.programs.managed_driver import ManagedDriver
 
 
 class Talker(Node):
@@ -25,23 +27,13 @@ class Talker(Node):
         self.create_timer(0.05, lambda: words.publish(String(data=text)))
 
 
-class Camera(LifecycleNode):
+class Camera(ManagedDriver):
     def __init__(self, **options: Any) -> None:
         super().__init__("camera", **options)
-        self.declare_parameter("refuse", "")
 
-    def on_configure(self, _: Any) -> TransitionCallbackReturn:
-        self.words = self.create_lifecycle_publisher(String, "words", 10)
-        self.ticks = self.create_timer(0.05, lambda: self.words.publish(String(data="picture")))
-        if self.get_parameter("refuse").value == "configure":
-            return TransitionCallbackReturn.FAILURE
-        return TransitionCallbackReturn.SUCCESS
-
-    def on_cleanup(self, _: Any) -> TransitionCallbackReturn:
+    def on_cleanup(self, state: Any) -> TransitionCallbackReturn:
         self.get_logger().info("cleaned up")
-        self.destroy_timer(self.ticks)
-        self.destroy_lifecycle_publisher(self.words)
-        return TransitionCallbackReturn.SUCCESS
+        return super().on_cleanup(state)
 
 
 class Broken(Node):

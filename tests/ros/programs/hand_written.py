@@ -7,14 +7,15 @@ two latched messages of arm.
 
 from __future__ import annotations
 
-import sys
 import time
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
+
+from tests.ros.programs.spinning import spin
 
 
 class Arm(LifecycleNode):
@@ -34,23 +35,13 @@ class Slow(LifecycleNode):
         return TransitionCallbackReturn.SUCCESS
 
 
-def main() -> None:
+if __name__ == "__main__":
     rclpy.init()
-    executor = MultiThreadedExecutor(4)
     arm = Arm("arm", namespace="/other")
     arm.publish_latched()
-    for node in (
+    spin(
         LifecycleNode("planner", namespace="/planning"),
         Slow("planner", namespace="/other"),
         arm,
-    ):
-        executor.add_node(node)
-    print("ready", flush=True)
-    try:
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        sys.exit(0)
-
-
-if __name__ == "__main__":
-    main()
+        executor=MultiThreadedExecutor(4),
+    )

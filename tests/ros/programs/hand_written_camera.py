@@ -8,17 +8,17 @@ Prints ``ready`` at the start.
 
 from __future__ import annotations
 
-import sys
 from array import array
 
 import rclpy
 from nav_msgs.msg import OccupancyGrid
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import UInt8MultiArray
+
+from tests.ros.programs.spinning import spin
 
 WIDTH, HEIGHT = 640, 480
 #: The smallest valid PNG: one transparent pixel.
@@ -56,15 +56,6 @@ class Camera(Node):
         self.compressed.publish(CompressedImage(format="png", data=PNG))
 
 
-def main() -> None:
-    rclpy.init()
-    node = Camera()
-    print("ready", flush=True)
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        sys.exit(0)
-
-
 if __name__ == "__main__":
-    main()
+    rclpy.init()
+    spin(Camera())

@@ -8,7 +8,6 @@ publish /lab/mixed, with different types; two nodes have the name /lab/twin. The
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import Any
 
@@ -18,10 +17,12 @@ from geometry_msgs.msg import PointStamped
 from rclpy.action import ActionServer
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Int32, String
+
+from tests.ros.programs.spinning import spin
 
 AGE = Duration(seconds=0.25)
 
@@ -35,8 +36,8 @@ def work_forever(_: Any) -> Navigate.Result:
 def main() -> None:
     rclpy.init()
     scanner, mapper = (Node(name, namespace="/lab") for name in ("scanner", "mapper"))
+    twin, other_twin = (Node("twin", namespace="/lab") for _ in range(2))
     scans = scanner.create_publisher(PointStamped, "scan", qos_profile_sensor_data)
-
     plain = scanner.create_publisher(Int32, "plain", 10)
 
     def scan() -> None:
@@ -54,15 +55,8 @@ def main() -> None:
     odd = Node("odd", namespace="/lab", context=context)
     odd.create_publisher(String, "mixed", 10)
     server = ActionServer(mapper, Navigate, "endless", work_forever)
-    executor = MultiThreadedExecutor(3)
-    for node in (scanner, mapper, *(Node("twin", namespace="/lab") for _ in range(2))):
-        executor.add_node(node)
-    print("ready", flush=True)
-    try:
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        server.destroy()  # the process may take long to end, with a participant that responds
-        sys.exit(0)
+    spin(scanner, mapper, twin, other_twin, executor=MultiThreadedExecutor(3))
+    server.destroy()  # the process may take long to end, with a participant that responds
 
 
 if __name__ == "__main__":

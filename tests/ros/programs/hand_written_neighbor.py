@@ -18,6 +18,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
+from tests.ros.programs.spinning import spin
+
 FLOOD_S = 0.001
 REQUESTS_S = 0.02
 STATE = "/hardy/manager/state"
@@ -64,12 +66,6 @@ class Neighbor(Node):
                 client.call_async(ChangeState.Request(transition=transition))
 
 
-def main() -> None:
-    rclpy.init()
-    node = Neighbor()
-    print("ready", flush=True)
-    rclpy.spin(node)
-
-
 if __name__ == "__main__":
-    main()
+    rclpy.init()
+    spin(Neighbor())

@@ -6,7 +6,6 @@ timers run while they are active.
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -15,10 +14,10 @@ import rclpy
 from composer_interfaces.action import Navigate
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.action import ActionServer
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNodeMixin, TransitionCallbackReturn
 
 from benchmarks import baseline_pipeline
+from tests.ros.programs.spinning import spin
 
 #: In m/s, as in nodes/planner.yaml.
 MAX_VELOCITY = ParameterDescriptor(
@@ -44,11 +43,9 @@ class Managed(LifecycleNodeMixin):
             (self.destroy_timer, list(self.timers)),
         ]
 
-    def on_configure(self, _: Any) -> TransitionCallbackReturn:
+    def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self.create_entities()
-        for timer in self.timers:
-            timer.cancel()
-        return TransitionCallbackReturn.SUCCESS
+        return self.on_deactivate(state)
 
     def on_activate(self, _: Any) -> TransitionCallbackReturn:
         for timer in self.timers:
@@ -95,18 +92,10 @@ class MotorController(Managed, baseline_pipeline.MotorController):
         return Navigate.Result(success=True, message="arrived")
 
 
-def main() -> None:
+if __name__ == "__main__":
     rclpy.init()
-    executor = SingleThreadedExecutor()
     nodes = [SensorSimulator(), Planner(), MotorController()]
     for node in nodes:
         node.trigger_configure()
         node.trigger_activate()
-        executor.add_node(node)
-    print("ready", flush=True)
-    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-        executor.spin()
-
-
-if __name__ == "__main__":
-    main()
+    spin(*nodes)

@@ -8,7 +8,6 @@ parameters. Prints ``ready`` at the start and counts the messages it sent on /la
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import Any
 
@@ -17,11 +16,13 @@ from composer_interfaces.action import Navigate
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBool
+
+from tests.ros.programs.spinning import spin
 
 
 class Talker(Node):
@@ -81,16 +82,6 @@ class Talker(Node):
         return Navigate.Result(success=True, message="there", distance_traveled=2.5)
 
 
-def main() -> None:
-    rclpy.init()
-    executor = MultiThreadedExecutor(4)
-    executor.add_node(Talker())
-    print("ready", flush=True)
-    try:
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        sys.exit(0)
-
-
 if __name__ == "__main__":
-    main()
+    rclpy.init()
+    spin(Talker(), executor=MultiThreadedExecutor(4))

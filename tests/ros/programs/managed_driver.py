@@ -14,8 +14,8 @@ from std_msgs.msg import String
 
 
 class ManagedDriver(LifecycleNode):
-    def __init__(self) -> None:
-        super().__init__("some_managed_driver")
+    def __init__(self, name: str = "some_managed_driver", **options: Any) -> None:
+        super().__init__(name, **options)
         self.declare_parameter("refuse", "")
 
     def on_configure(self, _: Any) -> TransitionCallbackReturn:

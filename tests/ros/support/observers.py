@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 from tests.ros.support.commands import PROGRAMS
 
-PROGRAM = (sys.executable, str(PROGRAMS / "hand_written_names.py"))
+PROGRAM = (sys.executable, str(PROGRAMS / "roles.py"), "observer")
 
 
 class Observer:
