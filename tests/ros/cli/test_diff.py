@@ -21,7 +21,7 @@ from tests.ros.support.commands import (
     start,
 )
 
-INTRUDER = "hand_written_intruder.py"
+INTRUDER = ("roles.py", "intruder")
 PLANNER = "/planning/planner"
 
 
@@ -75,7 +75,7 @@ def test_an_external_publisher_of_another_type_is_reported(pipeline: Running) ->
         found = json.loads(done.stdout or '{"drift": []}')
         return [item["message"] for item in found["drift"]]
 
-    with hand_written(INTRUDER):
+    with hand_written(*INTRUDER):
         done = repeated(
             lambda done: messages(done) == [conflict, extra],
             *("diff", "systems/pipeline.yaml", "--json"),

@@ -25,7 +25,7 @@ from composer.runtime.intra_process import match_flag
 from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
-NUMBERING_LISTENER = Path(__file__).parents[1] / "programs" / "numbering_listener.py"
+ROLES = Path(__file__).parents[1] / "programs" / "roles.py"
 
 
 def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -> None:
@@ -199,7 +199,7 @@ def test_dds_is_used_only_while_an_external_subscription_matches(tmp_path: Path)
     with running(NUMBERS.replace("KIND", "events"), tmp_path, counting=MODULE) as system:
         for visit in range(2):
             send(system, 20)  # to no external node
-            command = [sys.executable, str(NUMBERING_LISTENER)]
+            command = [sys.executable, str(ROLES), "numbering"]
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as listener:
                 try:
                     wait_for_matches(system, lambda count: count == 3)
