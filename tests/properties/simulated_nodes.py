@@ -9,7 +9,7 @@ from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 from hypothesis import strategies as st
 
@@ -20,17 +20,9 @@ from composer.plan import Fault
 from composer.runtime.clock.clock import COMPUTER
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import TransitionOutcome
-from composer.runtime.supervision.main_queue import (
-    Item,
-    MainQueue,
-    NodeReturned,
-    StepEnded,
-)
+from composer.runtime.supervision.main_queue import Item, MainQueue, NodeReturned, StepEnded
 from composer.runtime.supervision.node_listener import SupervisionListener
 from tests.unit.support.resolving import system_of
-
-if TYPE_CHECKING:
-    pass
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH
+from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic
 from composer.base.source import SourceFile
 from composer.language.document import parse_bytes, parse_document
 from composer.language.document.limits import MAX_INTEGER, MIN_INTEGER
@@ -25,35 +25,33 @@ PIECES = st.sampled_from(
 )  # fmt: skip
 
 
+def check(tree: Tree | None, source: SourceFile, diagnostics: list[Diagnostic]) -> None:
+    assert tree is not None or diagnostics
+    for diagnostic in diagnostics:
+        place = diagnostic.primary
+        assert place.file == source
+        assert 1 <= place.line <= len(source.lines)
+        assert 1 <= place.column <= len(source.line(place.line)) + 1
+        assert diagnostic.message.isprintable()
+        assert len(diagnostic.message) < 2 * MAXIMUM_VALUE_LENGTH + 100
+        assert diagnostic.hint is None or diagnostic.hint.isprintable()
+
+
 @examples(300)
 @given(st.binary(max_size=200))
 @example(b"\xff\xfe\x00")
 @example(b"%YAML 1." + b"9" * 5000)
 @example(b'"\\U00110000"')
 def test_any_bytes(data: bytes) -> None:
-    tree, source, diagnostics = parse_bytes(data, "f")
-    assert tree is not None or diagnostics
-    for diagnostic in diagnostics:
-        assert diagnostic.primary.file == source
-        assert 1 <= diagnostic.primary.line <= len(source.lines)
-        assert 1 <= diagnostic.primary.column <= len(source.line(diagnostic.primary.line)) + 1
-        assert diagnostic.message.isprintable()
-        assert len(diagnostic.message) < 2 * MAXIMUM_VALUE_LENGTH + 100
+    check(*parse_bytes(data, "f"))
 
 
 @examples(500)
 @given(st.lists(PIECES, max_size=30).map("".join))
 def test_any_text(text: str) -> None:
-    tree, diagnostics = parse_document(SourceFile("f", text))
-    assert tree is not None or diagnostics
-    for diagnostic in diagnostics:
-        assert (
-            1
-            <= diagnostic.primary.column
-            <= len(diagnostic.primary.file.line(diagnostic.primary.line)) + 1
-        )
-        assert diagnostic.message.isprintable()
-        assert diagnostic.hint is None or diagnostic.hint.isprintable()
+    source = SourceFile("f", text)
+    tree, diagnostics = parse_document(source)
+    check(tree, source, diagnostics)
 
 
 characters = st.characters(
