@@ -18,7 +18,7 @@ from tests.browser.conftest import Opened
 from tests.unit.support.fleets import fleet
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import FloatRect, Page
 
 Open = Callable[..., Opened]
 NODES = "[data-view=nodes]"
@@ -64,6 +64,12 @@ def scale(page: Page, view: str = "nodes") -> float:
     return float(found)
 
 
+def box_of(page: Page, selector: str) -> FloatRect:
+    box = page.locator(selector).bounding_box()
+    assert box is not None
+    return box
+
+
 def visible_keys(page: Page, view: str = "nodes") -> set[str]:
     script = """view => [...document.querySelectorAll(`[data-view=${view}] [data-key]`)]
         .filter(element => element.getBoundingClientRect().width > 0)
@@ -72,23 +78,17 @@ def visible_keys(page: Page, view: str = "nodes") -> set[str]:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_every_example_opens_in_every_view(name: str, open_file: Open, tmp_path: Path) -> None:
-    page = open_file(written(tmp_path, name)).page
-    for view in View:
-        page.click(f"#tab-{view}")
-        assert page.is_visible(f"#view-{view} .picture")
-        assert page.locator(".picture:visible").count() == 1
-
-
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_every_example_is_an_svg_that_loads_nothing(
+def test_every_example_opens_in_every_view_and_as_an_svg(
     name: str, open_file: Open, tmp_path: Path
 ) -> None:
-    paths = [tmp_path / f"{view}.svg" for view in View]
-    for path, graph in zip(paths, graphs_of(name), strict=True):
+    opened = open_file(written(tmp_path, name))
+    for view in View:
+        opened.page.click(f"#tab-{view}")
+        assert opened.page.is_visible(f"#view-{view} .picture")
+        assert opened.page.locator(".picture:visible").count() == 1
+    for view, graph in zip(View, graphs_of(name), strict=True):
+        path = tmp_path / f"{view}.svg"
         path.write_bytes(render([graph], Format.SVG))
-    opened = open_file(paths[0])
-    for path in paths:
         opened.go(path)
         assert opened.page.evaluate("document.documentElement.tagName") == "svg"
         drawn = opened.page.evaluate("document.documentElement.width.baseVal.value")
@@ -96,7 +96,7 @@ def test_every_example_is_an_svg_that_loads_nothing(
         assert size == pytest.approx(drawn, abs=0.5)
 
 
-def test_a_click_shows_ports_parameters_qos_and_the_source_line(page: Page) -> None:
+def test_a_click_shows_details_and_dims_what_is_far(page: Page) -> None:
     assert page.is_hidden("#details")
     page.click(thing(PLANNER))
     text = page.inner_text("#details")
@@ -110,33 +110,23 @@ def test_a_click_shows_ports_parameters_qos_and_the_source_line(page: Page) -> N
         "pipeline.yaml:",
     ):
         assert expected in text
-    page.click("#close")
-    assert page.is_hidden("#details")
-
-
-def test_a_click_on_a_line_shows_the_port_behind_it(page: Page) -> None:
-    line = page.locator(
-        f'{NODES} [data-label="publisher:/perception/sensor_simulator.sensor_data"]'
-    )
-    line.click()
-    assert "nav_msgs/msg/Odometry" in page.inner_text("#about")
-
-
-def test_neighbors_are_a_click_away_and_the_rest_is_dimmed(page: Page) -> None:
-    page.click(thing(PLANNER))
     assert page.locator(f"{NODES} .near").count() > 0
     page.click("#neighbors button:has-text('/sensor_data')")
     assert page.inner_text("#about h2") == "/sensor_data"
     far = page.locator(thing("action:/navigate"))
     assert float(far.evaluate("element => getComputedStyle(element).opacity")) < 0.5
+    page.click("#close")
+    assert page.is_hidden("#details")
+    line = '[data-label="publisher:/perception/sensor_simulator.sensor_data"]'
+    page.click(f"{NODES} {line}")
+    assert "nav_msgs/msg/Odometry" in page.inner_text("#about")
 
 
 def test_search_finds_names_and_what_is_known_and_goes_from_one_to_the_next(page: Page) -> None:
     page.keyboard.press("/")
     page.keyboard.type("odometry")
-    assert (
-        page.inner_text("#matches") == "4 found"
-    )  # the topic, its publishers and its subscriptions
+    # The topic, its publishers and its subscriptions.
+    assert page.inner_text("#matches") == "4 found"
     page.keyboard.press("Enter")
     assert page.inner_text("#matches") == "1 of 4"
     assert page.inner_text("#about h2") == "/sensor_data"  # names come first
@@ -150,31 +140,24 @@ def test_search_finds_names_and_what_is_known_and_goes_from_one_to_the_next(page
     assert page.inner_text("#matches") == "0 found"
 
 
-def test_filter_by_namespace_keeps_what_its_nodes_are_joined_to(page: Page) -> None:
+def test_filters_keep_what_is_joined_and_hold_in_all_views(page: Page) -> None:
     page.click(".filter summary")
     page.uncheck("input[name=namespace][value='/control']")
     page.uncheck("input[name=namespace][value='/perception']")
     assert visible_keys(page) == {PLANNER, "topic:/sensor_data", "service:/plan_trajectory"}
+    page.keyboard.press("Escape")
+    page.click("#tab-connections")
+    assert page.is_hidden(thing("node:/control/motor_controller", "connections"))
+    assert page.is_visible(thing(PLANNER, "connections"))
+    page.click("#tab-nodes")
+    page.click(".filter summary")
     page.click("#everything")
     assert "node:/control/motor_controller" in visible_keys(page)
-
-
-def test_filter_by_kind_takes_the_lines_with_it(page: Page) -> None:
-    page.click(".filter summary")
     page.uncheck("input[name=kind][value='topic']")
     assert not any(key.startswith("topic:") for key in visible_keys(page))
     assert page.locator(f"{NODES} path.edge.topic:visible").count() == 0
     assert page.locator(f"{NODES} path.edge.service:visible").count() == 2
     assert page.locator(".filter.active").count() == 1
-
-
-def test_filters_hold_in_all_views(page: Page) -> None:
-    page.click(".filter summary")
-    page.uncheck("input[name=namespace][value='/control']")
-    page.keyboard.press("Escape")
-    page.click("#tab-connections")
-    assert page.is_hidden(thing("node:/control/motor_controller", "connections"))
-    assert page.is_visible(thing(PLANNER, "connections"))
 
 
 def test_zoom_by_buttons_keys_and_wheel_and_back(page: Page) -> None:
@@ -184,12 +167,10 @@ def test_zoom_by_buttons_keys_and_wheel_and_back(page: Page) -> None:
     page.keyboard.press("-")
     assert scale(page) == pytest.approx(first, rel=0.01)
     page.hover(thing(PLANNER))
-    before = page.locator(thing(PLANNER)).bounding_box()
+    before = box_of(page, thing(PLANNER))
     page.mouse.wheel(0, -400)
     page.wait_for_function(f"document.querySelector('{NODES} .picture').dataset.scale > {first}")
-    after = page.locator(thing(PLANNER)).bounding_box()
-    assert before is not None
-    assert after is not None
+    after = box_of(page, thing(PLANNER))
     assert after["width"] > before["width"]
     assert after["x"] < before["x"] < after["x"] + after["width"]  # the pointer stays on it
     page.keyboard.press("0")
@@ -197,14 +178,12 @@ def test_zoom_by_buttons_keys_and_wheel_and_back(page: Page) -> None:
 
 
 def test_dragging_moves_the_picture_and_is_not_a_click(page: Page) -> None:
-    box = page.locator(thing(PLANNER)).bounding_box()
-    assert box is not None
+    box = box_of(page, thing(PLANNER))
     page.mouse.move(box["x"] + 5, box["y"] + 5)
     page.mouse.down()
     page.mouse.move(box["x"] - 95, box["y"] + 65, steps=5)
     page.mouse.up()
-    moved = page.locator(thing(PLANNER)).bounding_box()
-    assert moved is not None
+    moved = box_of(page, thing(PLANNER))
     assert moved["x"] - box["x"] == pytest.approx(-100, abs=6)
     assert moved["y"] - box["y"] == pytest.approx(60, abs=6)
     assert page.is_hidden("#details")
@@ -330,10 +309,7 @@ def test_three_hundred_nodes_open_as_a_whole_and_are_quick_to_use(
     page = open_file(written(tmp_path, "fleet_300")).page
     for view in View:
         page.click(f"#tab-{view}")
-        frame = page.locator(f"#view-{view} .picture").bounding_box()
-        drawn = page.locator(f"#view-{view} .world").bounding_box()
-        assert frame is not None
-        assert drawn is not None
+        frame, drawn = (box_of(page, f"#view-{view} .{part}") for part in ("picture", "world"))
         assert drawn["x"] >= frame["x"] - 1
         assert drawn["y"] >= frame["y"] - 1
         assert drawn["x"] + drawn["width"] <= frame["x"] + frame["width"] + 1
@@ -342,8 +318,7 @@ def test_three_hundred_nodes_open_as_a_whole_and_are_quick_to_use(
     page.fill("#search", "controller_17")
     page.press("#search", "Enter")
     assert page.inner_text("#about h2") == "/area17/act/controller_17"
-    box = page.locator(thing("node:/area17/act/controller_17")).bounding_box()
-    assert box is not None
+    box = box_of(page, thing("node:/area17/act/controller_17"))
     assert box["width"] > 40  # it was brought near, and into sight
     assert 0 < box["x"] < 1280
     assert 0 < box["y"] < 800
@@ -367,12 +342,7 @@ def test_the_details_do_not_hide_what_they_are_about(
     page = open_file(written(tmp_path)).page
     page.set_viewport_size({"width": width, "height": 900})
     page.click(thing(PLANNER))
-    box, panel = (
-        page.locator(thing(PLANNER)).bounding_box(),
-        page.locator("#details").bounding_box(),
-    )
-    assert box is not None
-    assert panel is not None
+    box, panel = box_of(page, thing(PLANNER)), box_of(page, "#details")
     is_left = box["x"] + box["width"] <= panel["x"]
     above = box["y"] + box["height"] <= panel["y"]
     assert is_left or above
