@@ -1,4 +1,4 @@
-"""``compose validate`` on malicious files: it must report one diagnostic and stay within limits."""
+"""``compose validate`` on malicious files and includes: it reports one rule, within limits."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from tests.cli.compose import write_files
 
 #: Each attack is a process of its own, under limits.
 pytestmark = pytest.mark.slow
@@ -104,12 +106,6 @@ def test_user_code_is_parsed_but_not_executed(tmp_path: Path) -> None:
 
 
 def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:
-    (tmp_path / "nodes").mkdir()
-    (tmp_path / "interfaces" / "evil" / "msg").mkdir(parents=True)
-    (tmp_path / "interfaces" / "evil" / "package.xml").write_text("<name>evil</name>")
-    pipes = ["p.yaml", "nodes/pipe.yaml", "pipe.py", "interfaces/evil/msg/P.msg"]
-    for name in pipes:
-        os.mkfifo(tmp_path / name)
     text = """\
 system: a
 nodes:
@@ -117,14 +113,14 @@ nodes:
   two: {behavior: pipe:Pipe}
   three: {publishers: {p: {type: evil/msg/P, qos: command, external: true}}}
 """
-    (tmp_path / "a.yaml").write_text(text)
+    package = "interfaces/evil/package.xml"
+    write_files({"a.yaml": text, package: "<name>evil</name>"}, tmp_path)
+    for name in ("p.yaml", "nodes/pipe.yaml", "pipe.py", "interfaces/evil/msg/P.msg"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        os.mkfifo(tmp_path / name)
     result = validate(tmp_path, ".")
     assert result.code == 1
-    assert sorted(result.rules) == [
-        "class-missing",
-        "unknown-interface",
-        "unknown-node-type",
-    ]
+    assert sorted(result.rules) == ["class-missing", "unknown-interface", "unknown-node-type"]
     for name in ("p.yaml", "/dev/zero"):
         result = validate(tmp_path, name)
         assert (result.code, result.rules) == (1, ["unreadable-file"])
@@ -132,23 +128,17 @@ nodes:
 
 
 def test_links_out_of_the_project_are_not_followed(tmp_path: Path) -> None:
-    secret = tmp_path / "secret"
-    secret.write_text("node: secret\nsecret: confidential\n")
-    project = tmp_path / "project"
-    (project / "nodes").mkdir(parents=True)
+    project, secret = tmp_path / "project", tmp_path / "secret"
+    text = "system: a\nnodes:\n  one: {type: secret}\n  two: {behavior: linked:Linked}\n"
+    secret_text = "node: secret\nsecret: confidential\n"
+    write_files({"secret": secret_text, "project/a.yaml": text}, tmp_path)
+    (project / "nodes").mkdir()
     for name in ("nodes/secret.yaml", "linked.yaml", "linked.py", "composer.yaml"):
         (project / name).symlink_to(secret)
-    text = "system: a\nnodes:\n  one: {type: secret}\n  two: {behavior: linked:Linked}\n"
-    (project / "a.yaml").write_text(text)
     result = validate(project, ".")
     assert result.code == 1
-    assert sorted(result.rules) == [
-        "class-missing",
-        "unknown-node-type",
-        "unreadable-file",
-        "unreadable-file",
-        "unreadable-file",
-    ]
+    unreadable = ["unreadable-file"] * 3
+    assert sorted(result.rules) == ["class-missing", "unknown-node-type", *unreadable]
     assert result.out.count("a symbolic link out of the project") == 5
     assert "confidential" not in result.out + result.err
 
@@ -161,3 +151,78 @@ def test_file_names_with_control_characters_are_escaped(tmp_path: Path) -> None:
     for report in ("text", "json", "sarif", "github"):
         assert validate(tmp_path, ".", "--format", report).code == 1
     assert validate(tmp_path, "\x1b[2J missing.yaml").code == 2
+
+
+LOUD = "on_activate: {log: here}"
+
+
+def twice(name: str, following: str) -> str:
+    entries = [f"{{file: {following}.yaml, prefix: {prefix}_}}" for prefix in "ab"]
+    return f"system: {name}\ninclude: [{', '.join(entries)}]\n"
+
+
+def often(name: str, following: str, copies: int) -> str:
+    entry = f"{{for_each: {{i: {copies}}}, file: {following}.yaml, prefix: 'a${{i}}_'}}"
+    return f"system: {name}\ninclude:\n  - {entry}\n"
+
+
+MANY = f"system: many\nnodes:\n  n_${{i}}: {{for_each: {{i: 2000}}, {LOUD}}}\n"
+FEW = f"system: s\nnodes: {{n: {{{LOUD}}}}}\n"
+PATTERNS = ", ".join(f"n*{number}.p" for number in range(2000))
+PADDING = f"# {'x' * 1000}\n" * 900
+BOMBS: dict[str, tuple[dict[str, str], str, str]] = {
+    "two of two of two, and so on": (
+        {f"s{number}": twice(f"s{number}", f"s{number + 1}") for number in range(20)},
+        "too-large", "s16.yaml:2:18"),
+    "a few of very many": (
+        {"s0": often("s0", "s1", 40), "s1": often("s1", "many", 40), "many": MANY},
+        "too-large", "s1.yaml:3:31"),
+    "very many of few": (
+        {"s0": often("s0", "s1", 99), "s1": often("s1", "s2", 99), "s2": FEW},
+        "too-large", "s0.yaml:3:31"),
+    "large files": (
+        {"s0": "system: s\ninclude: [s1.yaml, s2.yaml, s3.yaml]\n",
+         **{f"s{number}": FEW.replace("n:", f"n{number}:") + PADDING for number in (1, 2, 3)}},
+        "too-large", "s0.yaml:2:29"),
+    "a cycle": ({"s0": twice("s0", "s1"), "s1": "system: s\ninclude: [s0.yaml]\n"},
+                 "cycle", "s0.yaml:2:18"),
+    "itself": ({"s0": "system: s\ninclude: [s0.yaml]\n"}, "cycle", "s0.yaml:2:11"),
+    "a billion copies": ({"s0": MANY.replace("2000", "1000000000")},
+                         "too-large", "s0.yaml:3:22"),
+    "copies of copies": ({"s0": MANY.replace("2000", "1000, j: 1000, k: 1000")},
+                         "too-large", "s0.yaml:3:22"),
+    "patterns": (
+        {"s0": f"{MANY}connections:\n  - topic: /t\n    from: [{PATTERNS}]\n"},
+        "too-large", "s0.yaml:6:2152"),
+    "a long pattern": (
+        {"s0": f"{MANY}connections:\n  - {{topic: /t, from: 'n{'*_' * 100_000}.p'}}\n"},
+        "too-large", "s0.yaml:5:23"),
+    "patterns for all": (
+        {"s0": MANY.replace("2000", "1900")
+         + "connections:\n  - {for_each: {i: 100}, topic: '/t${i}', from: '*.p'}\n"},
+        "too-large", "s0.yaml:5:49"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("files", "rule", "place"), BOMBS.values(), ids=BOMBS)
+def test_bomb(tmp_path: Path, files: dict[str, str], rule: str, place: str) -> None:
+    write_files({f"{name}.yaml": text for name, text in files.items()}, tmp_path)
+    result = validate(tmp_path, "s0.yaml")
+    assert (result.code, set(result.rules)) == (1, {rule}), result.out
+    assert PLACE.findall(result.out)[0] == place
+
+
+def test_only_files_in_the_project_are_included(tmp_path: Path) -> None:
+    project, secret = tmp_path / "project", tmp_path / "secret.yaml"
+    names = ["../secret.yaml", str(secret), "link.yaml", "loop.yaml", "pipe.yaml", "/dev/zero"]
+    names += [".", "x" * 5000, "~/a.yaml", "http://127.0.0.1:9/a.yaml"]
+    written = ", ".join(f'"{name}"' for name in names)
+    text = f"system: a\ninclude: [{written}]\n"
+    secret_text = "system: secret\nsecret: confidential\n"
+    write_files({"secret.yaml": secret_text, "project/a.yaml": text}, tmp_path)
+    os.mkfifo(project / "pipe.yaml")
+    (project / "link.yaml").symlink_to(secret)
+    (project / "loop.yaml").symlink_to(project / "loop.yaml")
+    result = validate(project, "a.yaml")
+    assert (result.code, result.rules) == (1, ["invalid-include"] * len(names)), result.out
+    assert "confidential" not in result.out + result.err

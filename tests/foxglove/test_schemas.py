@@ -5,9 +5,6 @@ Requires Node.js and ``npm ci --prefix tests/foxglove``.
 
 from __future__ import annotations
 
-import json
-import subprocess
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +12,7 @@ import pytest
 
 from composer.dashboard.foxglove.encoding import Schemas
 from composer.interfaces import Interfaces, Message
-from tests.programs import require_package
+from tests.programs import require_package, run_node
 
 HERE = Path(__file__).parent
 
@@ -30,20 +27,6 @@ SAME = {
 @pytest.fixture(scope="module", autouse=True)
 def parser() -> None:
     require_package(HERE, "@foxglove/rosmsg")
-
-
-def read(schemas: Mapping[str, str]) -> dict[str, Any]:
-    """Return the definitions as parsed by Foxglove, in a single process."""
-    done = subprocess.run(
-        ["node", "read.mjs"],
-        cwd=HERE,
-        input=json.dumps(schemas),
-        capture_output=True,
-        check=True,
-        text=True,
-    )
-    parsed: dict[str, Any] = json.loads(done.stdout)
-    return parsed
 
 
 def fields(message: Message) -> list[tuple[str, str, bool, Any]]:
@@ -76,7 +59,7 @@ def test_every_known_message() -> None:
     known = {name: text for name, text in texts.items() if text is not None}
     assert len(known) > 200
     assert len(known) == len(texts)
-    for name, parsed in read(known).items():
+    for name, parsed in run_node(HERE, "read.mjs", known).items():
         assert "error" not in parsed, (name, parsed, known[name])
         message = interfaces.message(name)
         assert message is not None
@@ -98,5 +81,5 @@ def test_every_known_service() -> None:
         assert found is not None, name
         known[f"{name} request"], known[f"{name} response"] = found
     assert len(known) > 100
-    errors = {name: parsed for name, parsed in read(known).items() if "error" in parsed}
-    assert errors == {}
+    parsed = run_node(HERE, "read.mjs", known)
+    assert {name: found for name, found in parsed.items() if "error" in found} == {}

@@ -1,4 +1,4 @@
-"""Every file in err/ gives exactly the report next to it.
+"""Every file in err/ gives the report next to it, and every example system its plan in plan/.
 
 After an intended change, run ``pytest tests/golden --update-golden`` and review the diff.
 """
@@ -12,12 +12,16 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Rule
+from composer.base.resources import systems_folder
 from composer.loading import load, load_files
+from composer.plan import bring_up, tear_down
 from composer.report.text import render
 from composer.rules import all_checks
 
 ROOT = Path(__file__).parents[2]
 ERRORS = Path("tests/golden/err")
+PLANS = ROOT / "tests/golden/plan"
+SYSTEMS = sorted(systems_folder().glob("*.yaml"))
 CASES = sorted(path.name for path in (ROOT / ERRORS).glob("*.yaml"))
 CODE = re.compile(r"^\w+\[(RC\d+) ", re.MULTILINE)
 
@@ -71,3 +75,15 @@ def test_ten_mistakes_give_ten_diagnostics(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.chdir(ROOT)
     diagnostics = load(ERRORS / "ten_mistakes.yaml").diagnostics
     assert len(diagnostics) == len({diagnostic.message for diagnostic in diagnostics}) == 10
+
+
+@pytest.mark.parametrize("path", SYSTEMS, ids=[path.stem for path in SYSTEMS])
+def test_plan(path: Path) -> None:
+    system = load(path).system
+    assert system is not None
+    printed = f"# up\n{bring_up(system)}\n# down\n{tear_down(system)}\n"
+    assert printed == (PLANS / f"{path.stem}.txt").read_text(encoding="utf-8")
+
+
+def test_every_expected_plan_belongs_to_a_system() -> None:
+    assert {path.stem for path in PLANS.glob("*.txt")} == {path.stem for path in SYSTEMS}

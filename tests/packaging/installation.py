@@ -59,15 +59,17 @@ class Installation:
     elsewhere: Path
 
     @property
-    def runner_temp(self) -> str:
-        """The folder of the environment, for the steps of the action."""
-        return str(self.environment.parent)
-
-    @property
     def package(self) -> Path:
         """The folder of the installed package."""
         (package,) = self.environment.glob("lib/python*/site-packages/composer")
         return package
+
+    def validate(
+        self, folder: Path, paths: str, **variables: str
+    ) -> subprocess.CompletedProcess[str]:
+        """Run the step of the GitHub action that validates files."""
+        temporary = str(self.environment.parent)
+        return run_step("Validate", folder, RUNNER_TEMP=temporary, PATHS=paths, **variables)
 
     def run(
         self, *command: str | Path, variables: dict[str, str], timeout_s: float = 60

@@ -24,7 +24,6 @@ from tests.packaging.installation import (
 
 def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
-
     for path in (
         "composer/py.typed",
         "composer/python_code/stubs/libraries/rclpy/node.pyi",
@@ -41,11 +40,9 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
         "composer/dashboard/page/vendor/uplot/uPlot.esm.js",
     ):
         assert path in names
-    assert [name for name in names if name.endswith("/licenses/LICENSE")]
-    assert [name for name in names if name.endswith("/licenses/THIRD_PARTY.md")]
-    assert [
-        name for name in names if name.endswith("vendor/uplot/LICENSE") and "/licenses/" in name
-    ]
+    licenses = [name.partition("/licenses/")[2] for name in names if "/licenses/" in name]
+    assert {"LICENSE", "THIRD_PARTY.md"} <= set(licenses)
+    assert [name for name in licenses if name.endswith("vendor/uplot/LICENSE")]
     assert [name for name in names if "__pycache__" in name or name.startswith("tests/")] == []
 
 
@@ -85,21 +82,14 @@ def test_commands_without_ros(
 @pytest.mark.ros
 @pytest.mark.parametrize("name", ["talker_listener", "pipeline"])
 def test_a_shipped_system_runs_with_ros(installation: Installation, name: str) -> None:
+    variables = with_this_ros()
+    where = "import composer, rclpy; print(composer.__file__)"
+    done = installation.run("python", "-c", where, variables=variables)
+    assert Path(done.stdout.strip()).is_relative_to(installation.package), done.stderr
     system = installation.package / "share" / "systems" / f"{name}.yaml"
-
-    done = installation.run("compose", "run", system, "--for", "2", variables=with_this_ros())
-
+    done = installation.run("compose", "run", system, "--for", "2", variables=variables)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stdout + done.stderr
-
-
-@pytest.mark.ros
-def test_the_installed_package_is_imported(installation: Installation) -> None:
-    where = "import composer, rclpy; print(composer.__file__)"
-
-    done = installation.run("python", "-c", where, variables=with_this_ros())
-
-    assert Path(done.stdout.strip()).is_relative_to(installation.package), done.stderr
 
 
 def test_it_uses_official_actions_and_no_inputs_in_scripts() -> None:
@@ -112,42 +102,18 @@ def test_it_uses_official_actions_and_no_inputs_in_scripts() -> None:
     assert all(f"inputs.{name}" in text for name in ACTION["inputs"])
 
 
-def test_a_clean_project_passes(installation: Installation) -> None:
-    done = run_step(
-        "Validate",
-        ROOT,
-        RUNNER_TEMP=installation.runner_temp,
-        PATHS="systems\nnodes",
-        OPTIONS="--strict",
-    )
+def test_files_are_validated_by_the_action(installation: Installation, tmp_path: Path) -> None:
+    done = installation.validate(ROOT, "systems\nnodes", OPTIONS="--strict")
     assert (done.returncode, done.stdout) == (0, "")
-
-
-def test_diagnostics_are_annotations_and_sarif(installation: Installation, tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("system: a\nnodes: {one: {type: rely}}\n")
-    done = run_step(
-        "Validate",
-        tmp_path,
-        RUNNER_TEMP=installation.runner_temp,
-        PATHS=".",
-        SARIF_FILE="out.sarif",
-    )
+    done = installation.validate(tmp_path, ".", SARIF_FILE="out.sarif")
     assert done.returncode == 1
     assert done.stdout.startswith("::error file=a.yaml,line=2,")
     (result,) = json.loads((tmp_path / "out.sarif").read_text())["runs"][0]["results"]
     assert result["ruleId"] == "RC201"
-
-
-def test_an_invalid_option_exits_with_status_2(installation: Installation) -> None:
     for sarif_file in ("", "out.sarif"):
-        done = run_step(
-            "Validate",
-            installation.elsewhere,
-            RUNNER_TEMP=installation.runner_temp,
-            PATHS=str(ROOT / "systems"),
-            OPTIONS="--no-such-option",
-            SARIF_FILE=sarif_file,
-        )
+        options = {"OPTIONS": "--no-such-option", "SARIF_FILE": sarif_file}
+        done = installation.validate(installation.elsewhere, str(ROOT / "systems"), **options)
         assert done.returncode == 2
 
 

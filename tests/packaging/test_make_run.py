@@ -61,11 +61,10 @@ class Terminal:
     def press(self, key: bytes) -> None:
         os.write(self._keys, key)
 
-    def wait_for_stop(self) -> None:
+    def stop_and_resume(self) -> None:
+        """Press Ctrl-Z, and resume it like `fg`, until the system has the terminal again."""
+        self.press(CTRL_Z)
         os.waitpid(self.process, os.WUNTRACED)
-
-    def resume(self) -> None:
-        """Resume the command like `fg` in a shell, until the system has the terminal again."""
         os.killpg(self.process, signal.SIGCONT)
         while os.tcgetpgrp(self._keys) == self.process:
             time.sleep(0.01)
@@ -87,24 +86,17 @@ def terminal(make_run: list[str]) -> Iterator[Terminal]:
         os.killpg(terminal.process, signal.SIGKILL)
 
 
-def test_ctrl_c_in_a_terminal_exits_with_0_without_output_of_make(terminal: Terminal) -> None:
+@pytest.mark.parametrize("is_stopped_before", [False, True])
+def test_ctrl_c_in_a_terminal_exits_with_0_without_output_of_make(
+    terminal: Terminal, is_stopped_before: bool
+) -> None:
     terminal.wait_for(b"up: run some.yaml")
+    if is_stopped_before:
+        terminal.stop_and_resume()
     terminal.press(CTRL_C)
-
     assert terminal.wait() == 0
     assert b"down after SIGINT" in terminal.output
-    assert b"make:" not in terminal.output
-
-
-def test_a_stopped_system_resumes_and_reacts_to_ctrl_c(terminal: Terminal) -> None:
-    terminal.wait_for(b"up:")
-    terminal.press(CTRL_Z)
-    terminal.wait_for_stop()
-    terminal.resume()
-    terminal.press(CTRL_C)
-
-    assert terminal.wait() == 0
-    assert b"down after SIGINT" in terminal.output
+    assert is_stopped_before or b"make:" not in terminal.output
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -9,7 +9,6 @@ import sys
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 
 from tests.ros.support.sequences import Sequences
 
@@ -62,12 +61,7 @@ class ExternalProcess:
     def __enter__(self) -> ExternalProcess:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.go(killed=True)
 
     def has_received(self, count: int) -> bool:

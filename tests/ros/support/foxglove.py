@@ -49,20 +49,16 @@ class FoxgloveClient:
         self._process.stdin.flush()
 
     def until(
-        self,
-        event: str,
-        fits: Callable[[Any], Any] = lambda _: True,
-        within_s: float = PATIENCE_S,
+        self, event: str, fits: Callable[[Any], Any] = lambda _: True, within_s: float = PATIENCE_S
     ) -> Any:
         """Return the data of the first such event, from now or before, that fits."""
         end_s = time.monotonic() + within_s
         position = 0
         while True:
-            while position < len(self.events):
-                found, data = self.events[position]
-                position += 1
+            for found, data in self.events[position:]:
                 if found == event and fits(data):
                     return data
+            position = len(self.events)
             left_s = end_s - time.monotonic()
             try:
                 content = json.loads(self._new.get(timeout=max(left_s, 0.0)))
@@ -80,10 +76,7 @@ class FoxgloveClient:
         return identifier
 
     def message(
-        self,
-        topic: str,
-        fits: Callable[[Any], Any] = lambda _: True,
-        within_s: float = PATIENCE_S,
+        self, topic: str, fits: Callable[[Any], Any] = lambda _: True, within_s: float = PATIENCE_S
     ) -> Any:
         """Return the first message of a topic whose value fits."""
         return self.until(

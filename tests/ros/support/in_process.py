@@ -13,11 +13,8 @@ from pathlib import Path
 from textwrap import dedent
 from typing import Any, TypeVar
 
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
-from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -51,7 +48,7 @@ from composer.runtime.supervision.events import (
     StateChanged,
 )
 from tests.ros.support.leaving import leave
-from tests.ros.support.service_calls import Call, ServiceClients, ids_of
+from tests.ros.support.service_calls import ServiceUser, ids_of
 
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
 PATIENCE_S = 60.0
@@ -271,20 +268,22 @@ def running(
         system.stop()
 
 
-class Peer:
+class Peer(ServiceUser):
     """A hand-written node in a participant of its own."""
 
     def __init__(self) -> None:
         remove_incomplete_ports(int(os.environ["ROS_DOMAIN_ID"]))
         self.context = Context()
         self.context.init([])
-        self.node = Node(f"peer_{os.getpid()}", context=self.context)
+        super().__init__(Node(f"peer_{os.getpid()}", context=self.context))
         self._joined: list[Node] = []
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
-        self._services = ServiceClients(self.node, wait_until)
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
+
+    def wait_until(self, condition: Callable[[], Any], what: str = "") -> object:
+        return wait_until(condition, what)
 
     def close(self) -> None:
         self._executor.shutdown()
@@ -318,17 +317,6 @@ class Peer:
         wait_until(lambda: publisher.get_subscription_count() > 0, f"a subscription of {topic}")
         return publisher
 
-    def client(self, kind: Any, name: str) -> Any:
-        """Return a client whose responses are not lost; see :class:`.ServiceClients`."""
-        return self._services.client(kind, name)
-
-    def action_client(self, kind: Any, name: str) -> ActionClient:
-        """Return a client whose responses are not lost."""
-        client = ActionClient(self.node, kind, name)
-        wait_until(client.server_is_ready, f"action {name}")
-        self._services.wait_until_acquainted(f"{name}/_action/send_goal")
-        return client
-
     def servers(self, name: str) -> set[bytes]:
         """Return the ids of the servers of a service that the peer has discovered.
 
@@ -336,30 +324,7 @@ class Peer:
         """
         return ids_of(servers_of(self.node, name))
 
-    def call(self, kind: Any, name: str, request: Any = None) -> Any:
-        """Call a service and return its response; see :class:`.ServiceClients`."""
-        return self._services.call(kind, name, request)
-
-    def begin(self, kind: Any, name: str, request: Any = None) -> Call:
-        """Send a request; return the call, for :func:`.finished`."""
-        return self._services.begin(kind, name, request)
-
-    def change(self, node: str, transition: str | int) -> bool:
-        """Request a transition by its label or its id; return its success."""
-        return bool(finished(self.begin_change(node, transition)).success)
-
-    def begin_change(self, node: str, transition: str | int) -> Call:
-        """Request a transition; return the call, for :func:`.finished`."""
-        requested = (
-            Transition(label=transition)
-            if isinstance(transition, str)
-            else Transition(id=transition)
-        )
-        request = ChangeState.Request(transition=requested)
-        return self.begin(ChangeState, f"{node}/change_state", request)
-
-    def state(self, node: str) -> str:
-        return str(self.call(GetState, f"{node}/get_state").current_state.label)
+    change = ServiceUser.change_state
 
     def wait_until_known(self, node: str) -> None:
         """Wait until the process of a node has discovered everything that this one has created.

@@ -72,32 +72,30 @@ def own_prefix(node: Node) -> bytes:
     return bytes(end.endpoint_gid[:PREFIX_BYTES])
 
 
+def _pointer(kind: type, name: str) -> int:
+    """Return a pointer that the metaclass of a message class has."""
+    capsule = ctypes.py_object(getattr(type(kind), name))
+    return int(ctypes.pythonapi.PyCapsule_GetPointer(capsule, None))
+
+
 def create(node: Node, kind: type, name: str, *, publisher: bool = True) -> int:
     """Return rmw's publisher or subscription of a DDS topic."""
     check_for_type_support(kind)
-    support = ctypes.pythonapi.PyCapsule_GetPointer(
-        ctypes.py_object(type(kind)._TYPE_SUPPORT), None
-    )
     make = RMW.rmw_create_publisher if publisher else RMW.rmw_create_subscription
     handle = ctypes.c_void_p(RCL.rcl_node_get_rmw_handle(ctypes.c_void_p(node.handle.pointer)))
     options = ctypes.byref(_Options())
     text = ctypes.c_char_p(name.encode())
-    made = make(handle, ctypes.c_void_p(support), text, ctypes.byref(PROFILE), options)
+    support = ctypes.c_void_p(_pointer(kind, "_TYPE_SUPPORT"))
+    made = make(handle, support, text, ctypes.byref(PROFILE), options)
     assert made, name
     return int(made)
 
 
 def _publish(publisher: int, message: ParticipantEntitiesInfo) -> None:
-    metaclass = type(ParticipantEntitiesInfo)
-
-    def function(name: str, result: type | None, *arguments: type) -> object:
-        pointer = ctypes.pythonapi.PyCapsule_GetPointer(
-            ctypes.py_object(getattr(metaclass, name)), None
-        )
-        return ctypes.PYFUNCTYPE(result, *arguments)(pointer)
-
-    raw = function("_CREATE_ROS_MESSAGE", ctypes.c_void_p)()
-    function("_CONVERT_FROM_PY", ctypes.c_bool, ctypes.py_object, ctypes.c_void_p)(message, raw)
+    make = ctypes.PYFUNCTYPE(ctypes.c_void_p)
+    convert = ctypes.PYFUNCTYPE(ctypes.c_bool, ctypes.py_object, ctypes.c_void_p)
+    raw = make(_pointer(ParticipantEntitiesInfo, "_CREATE_ROS_MESSAGE"))()
+    convert(_pointer(ParticipantEntitiesInfo, "_CONVERT_FROM_PY"))(message, raw)
     result = RMW.rmw_publish(ctypes.c_void_p(publisher), ctypes.c_void_p(raw), None)
     assert result == 0
 

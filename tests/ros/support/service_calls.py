@@ -11,8 +11,10 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from lifecycle_msgs.srv import GetState
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters
+from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -69,6 +71,55 @@ class ServiceClients:
         if name not in self._clients:
             self._clients[name] = _Client(self._node, kind, name)
         return self._clients[name]
+
+
+class ServiceUser:
+    """Requests from a hand-written node; a derived class says how to wait."""
+
+    node: Node
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self._services = ServiceClients(node, self.wait_until)
+
+    def wait_until(self, condition: Callable[[], Any], what: str = "") -> object:
+        """Wait until the condition holds, while the node is spun."""
+        raise NotImplementedError
+
+    def client(self, kind: Any, name: str) -> Any:
+        """Return a client whose responses are not lost; see :class:`.ServiceClients`."""
+        return self._services.client(kind, name)
+
+    def action_client(self, kind: Any, name: str) -> ActionClient:
+        """Return a client whose responses are not lost."""
+        client = ActionClient(self.node, kind, name)
+        self.wait_until(client.server_is_ready, f"action {name}")
+        self._services.wait_until_acquainted(f"{name}/_action/send_goal")
+        return client
+
+    def call(self, kind: Any, name: str, request: Any = None) -> Any:
+        """Call a service and return its response; see :class:`.ServiceClients`."""
+        return self._services.call(kind, name, request)
+
+    def begin(self, kind: Any, name: str, request: Any = None) -> Call:
+        """Send a request; return the call, for :func:`.finished`."""
+        return self._services.begin(kind, name, request)
+
+    def begin_change(self, node: str, transition: str | int) -> Call:
+        """Request a transition by its label or its id; return the call."""
+        key = "label" if isinstance(transition, str) else "id"
+        request = ChangeState.Request(transition=Transition(**{key: transition}))
+        return self.begin(ChangeState, f"{node}/change_state", request)
+
+    def change_state(self, node: str, transition: str | int) -> bool:
+        """Request a transition by its label or its id; return its success."""
+        call = self.begin_change(node, transition)
+        self.wait_until(call.done, f"a response of {node}")
+        return bool(call.result().success)
+
+    def state(self, node: str) -> str:
+        """Return the label of a node's lifecycle state."""
+        return str(self.call(GetState, f"{node}/get_state").current_state.label)
 
 
 class _Client:
