@@ -1,4 +1,4 @@
-"""``compose new``: what it creates is valid and has a passing test."""
+"""``compose new`` and ``compose import`` create valid files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from composer.cli.commands.import_nodes import why_too_large
+from tests.cli.compose import compose, write_files
 
 _SUFFIXES = (".yaml", ".py", ".xml", ".md", ".msg")
 
@@ -66,3 +67,35 @@ def test_names_that_ros_or_python_do_not_accept_are_refused(
 def test_a_node_type_that_replaces_a_built_in_one_is_noted(project: Path) -> None:
     note = "note: it replaces the built-in node type 'filter'"
     assert note in compose("new", "node", "filter").err
+
+
+def test_a_file_that_would_not_be_valid_is_refused_or_noted(folder: Path) -> None:
+    write_files({"driver.py": "from rclpy.node import Node\nclass Driver(Node):\n    pass\n"})
+    for arguments in (
+        ("class", "driver:Driver", "-o", "my driver.yaml"),
+        ("live", "--system", "my driver"),
+    ):
+        done = compose("import", *arguments)
+        assert (done.code, done.out) == (2, "")
+        assert "the name 'my driver' contains a space" in done.err
+    assert [path.name for path in folder.iterdir()] == ["driver.py"]
+    note = "note: the module 'driver' is not found from other/driver.yaml: move it next to"
+    assert note in compose("import", "class", "driver:Driver", "-o", "other/driver.yaml").err
+    done = compose("import", "class", "driver:Driver", "-o", "driver.yaml")
+    assert done.err == "wrote driver.yaml\n"
+
+
+@pytest.mark.parametrize(
+    ("count", "value", "problem"),
+    [
+        (5_000, "1.0", None),
+        (5_001, "1.0", "'parameters' has more than 5,000 entries"),
+        (300, "x" * 9_000, "this file is larger than 2,000,000 bytes"),
+    ],
+)
+def test_what_validate_would_refuse_is_not_written(
+    count: int, value: str, problem: str | None
+) -> None:
+    parameters = "".join(f"      p{number}: {value}\n" for number in range(count))
+    text = f"system: s\nnodes:\n  a:\n    external: true\n    parameters:\n{parameters}"
+    assert why_too_large(text) == problem
