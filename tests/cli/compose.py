@@ -37,6 +37,13 @@ def compose(*arguments: str) -> Done:
     return Done(code, out.text(), err.text())
 
 
+def refused(code: int, *arguments: str) -> str:
+    """Run a command that must fail and print nothing to stdout; return what it says."""
+    done = compose(*arguments)
+    assert (done.code, done.out) == (code, ""), done.err
+    return done.err
+
+
 def write_files(files: dict[str, str], folder: Path = Path()) -> None:
     """Write texts by the names of their files, in new folders if need be."""
     for name, text in files.items():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose, write_files
+from tests.cli.compose import compose, refused, write_files
 from tests.unit.support.fleets import fleet_text
 
 PIPELINE = "systems/pipeline.yaml"
@@ -45,12 +45,9 @@ def test_the_file_suffix_or_an_option_selects_the_format(
 
 
 def test_a_file_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
-    done = compose("graph", PIPELINE, "-o", str(tmp_path / "p.doc"))
-    assert done.code == 2
-    assert ".svg" in done.err
-    done = compose("graph", PIPELINE, "-o", str(tmp_path / "no" / "p.svg"))
-    assert done.code == 1
-    assert "No such file or directory" in done.err
+    assert ".svg" in refused(2, "graph", PIPELINE, "-o", str(tmp_path / "p.doc"))
+    message = refused(1, "graph", PIPELINE, "-o", str(tmp_path / "no" / "p.svg"))
+    assert "No such file or directory" in message
     done = compose("graph", PIPELINE, "-f", "svg", "-o", "/dev/null")
     assert (done.code, done.err) == (0, "wrote /dev/null\n")
 
@@ -65,12 +62,10 @@ def test_a_failed_write_leaves_the_file_as_it_was(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("composer.cli.support.new_files.os.replace", fail)
-    done = compose("graph", PIPELINE, "-o", str(target))
-    assert (done.code, done.out) == (1, "")
-    assert f"cannot write '{target}': No space left on device" in done.err
-    assert [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.iterdir()] == [
-        ("p.svg", "before")
-    ]
+    message = refused(1, "graph", PIPELINE, "-o", str(target))
+    assert f"cannot write '{target}': No space left on device" in message
+    assert list(tmp_path.iterdir()) == [target]
+    assert target.read_text(encoding="utf-8") == "before"
 
 
 def test_views() -> None:
@@ -89,12 +84,7 @@ def test_a_system_with_errors_is_drawn_if_there_is_one(folder: Path) -> None:
     assert done.code == 0
     assert "class v1 wrong" in done.out
     assert "error[" in done.err
-    done = compose("graph", "b.yaml")
-    assert (done.code, done.out) == (1, "")
-    done = compose("graph", "pipelin")
-    assert done.code == 2
-    assert "did you mean 'pipeline'?" in done.err
-    assert "talker_listener" in done.err
+    assert refused(1, "graph", "b.yaml")
 
 
 def test_several_systems_are_drawn_in_one_diagram() -> None:
@@ -102,13 +92,6 @@ def test_several_systems_are_drawn_in_one_diagram() -> None:
     data = json.loads(done.out)
     assert data["title"] == "minimal + talker_listener"
     assert {"node:/talker", "node:/listener"} <= {vertex["key"] for vertex in data["vertices"]}
-
-
-def test_systems_and_live_are_mutually_exclusive() -> None:
-    for arguments in ([], ["pipeline", "--live"]):
-        done = compose("graph", *arguments)
-        assert (done.code, done.out) == (2, "")
-        assert "--live" in done.err
 
 
 def test_a_diagram_too_large_for_mermaid_prints_a_warning(folder: Path) -> None:

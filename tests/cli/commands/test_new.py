@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.cli.commands.import_nodes import why_too_large
-from tests.cli.compose import compose, write_files
+from tests.cli.compose import compose, refused, write_files
 
 _SUFFIXES = (".yaml", ".py", ".xml", ".md", ".msg")
 
@@ -37,9 +37,7 @@ def test_a_project_and_what_is_added_to_it_are_valid(project: Path) -> None:
 
 def test_files_are_not_replaced(project: Path) -> None:
     before = (project / "nodes" / "counter.py").read_text()
-    done = compose("new", "node", "counter")
-    assert done.code == 1
-    assert "counter.yaml' exists already" in done.err
+    assert "counter.yaml' exists already" in refused(1, "new", "node", "counter")
     assert (project / "nodes" / "counter.py").read_text() == before
     (project / "systems" / "arm.yaml").touch()
     assert compose("new", "system", "arm").code == 1
@@ -58,9 +56,7 @@ def test_names_that_ros_or_python_do_not_accept_are_refused(
 ) -> None:
     before = set(project.rglob("*"))
     for name in names:
-        done = compose("new", kind, name)
-        assert (done.code, done.out) == (2, "")
-        assert f"'{name}'{message}" in done.err
+        assert f"'{name}'{message}" in refused(2, "new", kind, name)
     assert set(project.rglob("*")) == before
 
 
@@ -71,13 +67,8 @@ def test_a_node_type_that_replaces_a_built_in_one_is_noted(project: Path) -> Non
 
 def test_a_file_that_would_not_be_valid_is_refused_or_noted(folder: Path) -> None:
     write_files({"driver.py": "from rclpy.node import Node\nclass Driver(Node):\n    pass\n"})
-    for arguments in (
-        ("class", "driver:Driver", "-o", "my driver.yaml"),
-        ("live", "--system", "my driver"),
-    ):
-        done = compose("import", *arguments)
-        assert (done.code, done.out) == (2, "")
-        assert "the name 'my driver' contains a space" in done.err
+    message = refused(2, "import", "class", "driver:Driver", "-o", "my driver.yaml")
+    assert "the name 'my driver' contains a space" in message
     assert [path.name for path in folder.iterdir()] == ["driver.py"]
     note = "note: the module 'driver' is not found from other/driver.yaml: move it next to"
     assert note in compose("import", "class", "driver:Driver", "-o", "other/driver.yaml").err

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from composer.python_code.stubs.folder import HEADER
-from tests.cli.compose import compose, write_files
+from tests.cli.compose import compose, refused, write_files
 
 TYPED = "typings/composer/typed.pyi"
 #: A system with a node that has a behavior and ports of its own.
@@ -219,18 +219,14 @@ def test_a_folder_that_cannot_be_written_is_one_note(
 def test_what_the_command_cannot_use_is_an_error(
     project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert compose("stubs", "nowhere").code == 2
-    assert compose("stubs", "a" * 5000).code == 2
-    assert compose("stubs", "systems", str(tmp_path)).code == 2
+    for words in (["nowhere"], ["a" * 5000], ["systems", str(tmp_path)]):
+        assert compose("stubs", *words).code == 2
     (project / "typings").write_text("")
-    done = compose("stubs")
-    assert done.code == 1
-    assert "typings" in done.err
-    assert "internal error" not in done.err
+    message = refused(1, "stubs")
+    assert "typings" in message
+    assert "internal error" not in message
     monkeypatch.chdir(tmp_path)
-    done = compose("stubs")
-    assert done.code == 2
-    assert "there is no system and no node type" in done.err
+    assert "there is no system and no node type" in refused(2, "stubs")
     assert not (tmp_path / "typings").exists()
 
 

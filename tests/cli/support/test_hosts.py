@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from tests.cli.compose import compose, refused
 
 SYSTEM = """\
 system: robot
@@ -35,10 +35,9 @@ def test_the_extra_is_named_if_it_is_missing(
         "composer.cli.support.errors.find_spec",
         lambda name: None if name == "asyncssh" else find(name),
     )
-    done = compose("hosts", command, str(path))
-    assert done.code == 1
-    assert "needs asyncssh, which this Python does not have" in done.err
-    assert 'pip install "ros2-composer[hosts]"' in done.err
+    message = refused(1, "hosts", command, str(path))
+    assert "needs asyncssh, which this Python does not have" in message
+    assert 'pip install "ros2-composer[hosts]"' in message
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import io
 import math
-import shlex
 
 import pytest
 import yaml
@@ -11,7 +10,6 @@ from composer.cli.commands.topic_receive import without_items
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
 from composer.cli.support.terminal import as_json, as_yaml, columns, truncated
-from tests.cli.compose import compose
 
 
 @pytest.mark.parametrize("value", [1.5, "text", "ends with...", True, None, [1, 2], {"a": ["b"]}])
@@ -51,21 +49,3 @@ def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) 
     assert yaml_or_stdin(None, stdin=True) == "data: hello"
     with pytest.raises(UsageError, match="not both"):
         yaml_or_stdin("{x: 1}", stdin=True)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "problem"),
-    [
-        ("topic echo /x --field transforms[x].header", "is not a path of fields and indices"),
-        ("topic echo /x --filter 'message.data >'", "--filter: "),
-        ("topic pub /x std_msgs/msg/String {} --stdin", "not both"),
-        ("service call /x std_srvs/srv/Trigger {} --stdin", "not both"),
-        ("lifecycle set planner", "specify a transition of 'planner'"),
-        ("lifecycle set activate", "specify nodes"),
-        ("top --sort name", "cannot sort by 'name'"),
-    ],
-)
-def test_options_that_exclude_each_other(arguments: str, problem: str) -> None:
-    done = compose(*shlex.split(arguments))
-    assert done.code == 2
-    assert problem in done.err
