@@ -50,6 +50,7 @@ WORDS = [
     ),
     (NODE_OF + "publishers:\n      p:\n        external: |", "true false"),
 ]
+CONNECTIONS = "connections:\n  "
 ENDS = "from to server clients"
 #: Maps whose values have keys of the user.
 FREE = frozenset(
@@ -72,47 +73,35 @@ def test_the_words_of_a_value_are_offered(server: LanguageServer) -> None:
     assert {text: set(words) for text, words in offered.items()} == {
         text: set(words.split()) for text, words in WORDS
     }
-
-
-def test_the_words_of_node_types_are_offered(server: LanguageServer) -> None:
     cursor = server.open("node: n\nparameters:\n  p:\n    type: |\n", NODE)
     assert set(server.complete(cursor)) == set(PARAMETER_TYPES.split())
 
 
 @pytest.mark.parametrize(
-    ("text", "offered"),
-    [
-        ("arguments:\n  a:\n    |", "type default choices description"),
-        ("nodes:\n  n:\n    |", "for_each if unless"),
-        ("processes:\n  p:\n    |", "for_each if unless"),
-        ("include:\n  - file: a.yaml\n    |", "for_each if unless arguments"),
-        ("connections:\n  - topic: a\n    |", "for_each if unless"),
-    ],
-)
-def test_keys_of_arguments_and_conditions_are_offered(
-    server: LanguageServer, text: str, offered: str
-) -> None:
-    found = server.complete(server.open(f"system: s\n{text}\n", SYSTEM))
-    assert set(offered.split()) <= found.keys()
-
-
-@pytest.mark.parametrize(
     ("text", "offered", "not_offered"),
     [
-        ("- |", f"topic service action {ENDS}", ""),
-        ("- t|", f"topic service action {ENDS}", ""),
-        ("- {topic: a, from: n.a}\n  - |", f"topic service action {ENDS}", ""),
-        ("- from: n.a\n    |", "topic to", "from"),
-        ("- topic: a\n    |", "from to qos", "topic service action server clients"),
-        ("- service: a\n    |", "server clients qos", "topic service action from to"),
-        ("- action: a\n    |", "server clients qos", "topic service action from to"),
+        ("arguments:\n  a:\n    |", "type default choices description", ""),
+        ("nodes:\n  n:\n    |", "for_each if unless", ""),
+        ("processes:\n  p:\n    |", "for_each if unless", ""),
+        ("include:\n  - file: a.yaml\n    |", "for_each if unless arguments", ""),
+        ("connections:\n  - topic: a\n    |", "for_each if unless", ""),
+        (f"{CONNECTIONS}- |", f"topic service action {ENDS}", ""),
+        (f"{CONNECTIONS}- t|", f"topic service action {ENDS}", ""),
+        (f"{CONNECTIONS}- {{topic: a, from: n.a}}\n  - |", f"topic service action {ENDS}", ""),
+        (f"{CONNECTIONS}- from: n.a\n    |", "topic to", "from"),
+        (
+            f"{CONNECTIONS}- topic: a\n    |",
+            "from to qos",
+            "topic service action server clients",
+        ),
+        (f"{CONNECTIONS}- service: a\n    |", "server clients qos", "topic service action from to"),
+        (f"{CONNECTIONS}- action: a\n    |", "server clients qos", "topic service action from to"),
     ],
 )
-def test_all_forms_of_a_connection_are_offered(
+def test_keys_are_offered_with_their_documentation(
     server: LanguageServer, text: str, offered: str, not_offered: str
 ) -> None:
-    cursor = server.open(f"system: s\nconnections:\n  {text}\n", SYSTEM)
-    found = server.complete(cursor)
+    found = server.complete(server.open(f"system: s\n{text}\n", SYSTEM))
     assert set(offered.split()) <= found.keys()
     assert not set(not_offered.split()) & found.keys()
     assert [key for key, documentation in found.items() if not documentation] == []

@@ -76,20 +76,16 @@ def test_ports_parameters_and_fields_are_offered(
         ("publishers.target", "publishers.tar|get", "Publisher[PoseStamped]"),
         ("clients.enable", "clients.ena|ble", "Client[Request, Response]"),
         ("parameters.gain", "parameters.ga|in", "float"),
+        ("parameters.gain", "parameters.gai|n", "The gain. [1/s]"),
         ("* self.parameters", "* self.param|eters", "TrackerParameters"),
         ("position.x = ", "position.|x = ", "float"),
         ("final = ", "fi|nal = ", "GoalResult[Result]"),
     ],
 )
-def test_the_types_of_ports_parameters_and_fields_are_shown(
+def test_types_and_descriptions_are_shown(
     server: LanguageServer, root: Path, code: str, marked: str, shown: str
 ) -> None:
     assert shown in server.hover(opened(server, root, code, marked))
-
-
-def test_the_description_of_a_parameter_is_shown(server: LanguageServer, root: Path) -> None:
-    text = server.hover(opened(server, root, "parameters.gain", "parameters.gai|n"))
-    assert "The gain. [1/s]" in text
 
 
 def test_mistakes_are_reported_and_nothing_else(server: LanguageServer, root: Path) -> None:

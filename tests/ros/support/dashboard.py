@@ -153,26 +153,16 @@ class Browser:
 
     def until(self, number: int, fits: Callable[[Any], Any]) -> Any:
         """Return the first data of a subscription, from now or before, that fit."""
+        return self._first(number, "data", fits)
 
-        def found() -> list[Any]:
-            return [
-                update["data"]
-                for update in self.updates
-                if update["sub"] == number and "data" in update and fits(update["data"])
-            ]
-
-        self.wait(found)
-        return found()[0]
-
-    def failure(self, number: int) -> Message:
+    def failure(self, number: int) -> Any:
         """Return the first error of a subscription."""
+        return self._first(number, "error", lambda _: True)
 
-        def found() -> list[Message]:
-            return [
-                update["error"]
-                for update in self.updates
-                if update["sub"] == number and "error" in update
-            ]
+    def _first(self, number: int, key: str, fits: Callable[[Any], Any]) -> Any:
+        def found() -> list[Any]:
+            updates = [item for item in self.updates if item["sub"] == number and key in item]
+            return [item[key] for item in updates if fits(item[key])]
 
         self.wait(found)
         return found()[0]

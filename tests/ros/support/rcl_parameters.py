@@ -29,16 +29,13 @@ class _Allocator(Structure):
     _fields_ = [(name, c_void_p) for name in ("a", "deallocate", "r", "z", "state")]
 
 
-class _Bools(Structure):
-    _fields_ = [("values", POINTER(c_bool)), ("size", c_size_t)]
+def _array_of(kind: Any) -> Any:
+    """Return the structure of an array of a primitive type."""
+    fields = [("values", POINTER(kind)), ("size", c_size_t)]
+    return type("_Array", (Structure,), {"_fields_": fields})
 
 
-class _Integers(Structure):
-    _fields_ = [("values", POINTER(c_int64)), ("size", c_size_t)]
-
-
-class _Doubles(Structure):
-    _fields_ = [("values", POINTER(c_double)), ("size", c_size_t)]
+_Bools, _Integers, _Doubles = map(_array_of, (c_bool, c_int64, c_double))
 
 
 class _Strings(Structure):
