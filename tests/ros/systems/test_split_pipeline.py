@@ -38,12 +38,14 @@ from tests.ros.support.dashboard import browser, dashboard
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.pipeline import (
     NODES,
+    Graph,
     check_a_deactivated_planner,
     check_the_drive,
     check_the_navigation,
     check_the_planner,
+    graph_of,
+    stable_graph,
 )
-from tests.ros.support.pipeline_graph import Graph, graph_of, stable_graph
 from tests.ros.support.system_process import REPOSITORY, ExternalNode, RunningSystem
 
 PROCESSES = """
