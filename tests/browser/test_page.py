@@ -14,13 +14,12 @@ from composer.graph.diagram import Graph
 from composer.graph.output import Format, render
 from composer.graph.views import View, build_graph, scene_of
 from composer.loading import load
-from tests.browser.conftest import Opened
 from tests.unit.support.fleets import fleet
 
 if TYPE_CHECKING:
     from playwright.sync_api import FloatRect, Page
 
-Open = Callable[..., Opened]
+Open = Callable[..., "Page"]
 NODES = "[data-view=nodes]"
 PLANNER = "node:/planning/planner"
 EXAMPLES = [path.stem for path in sorted(systems_folder().glob("*.yaml"))]
@@ -51,7 +50,7 @@ def graphs_of(name: str) -> list[Graph]:
 
 @pytest.fixture
 def page(open_file: Open, tmp_path: Path) -> Page:
-    return open_file(written(tmp_path)).page
+    return open_file(written(tmp_path))
 
 
 def thing(key: str, view: str = "nodes") -> str:
@@ -81,18 +80,18 @@ def visible_keys(page: Page, view: str = "nodes") -> set[str]:
 def test_every_example_opens_in_every_view_and_as_an_svg(
     name: str, open_file: Open, tmp_path: Path
 ) -> None:
-    opened = open_file(written(tmp_path, name))
+    page = open_file(written(tmp_path, name))
     for view in View:
-        opened.page.click(f"#tab-{view}")
-        assert opened.page.is_visible(f"#view-{view} .picture")
-        assert opened.page.locator(".picture:visible").count() == 1
+        page.click(f"#tab-{view}")
+        assert page.is_visible(f"#view-{view} .picture")
+        assert page.locator(".picture:visible").count() == 1
     for view, graph in zip(View, graphs_of(name), strict=True):
         path = tmp_path / f"{view}.svg"
         path.write_bytes(render([graph], Format.SVG))
-        opened.go(path)
-        assert opened.page.evaluate("document.documentElement.tagName") == "svg"
-        drawn = opened.page.evaluate("document.documentElement.width.baseVal.value")
-        size = opened.page.evaluate("document.documentElement.getBoundingClientRect().width")
+        page = open_file(path)
+        assert page.evaluate("document.documentElement.tagName") == "svg"
+        drawn = page.evaluate("document.documentElement.width.baseVal.value")
+        size = page.evaluate("document.documentElement.getBoundingClientRect().width")
         assert size == pytest.approx(drawn, abs=0.5)
 
 
@@ -227,8 +226,8 @@ def test_everything_that_can_be_used_has_a_name_for_screen_readers(page: Page) -
 
 def test_light_dark_and_as_the_system_says(open_file: Open, tmp_path: Path) -> None:
     path = written(tmp_path)
-    light = background(open_file(path, color_scheme="light").page)
-    opened = open_file(path, color_scheme="dark").page
+    light = background(open_file(path, color_scheme="light"))
+    opened = open_file(path, color_scheme="dark")
     dark = background(opened)
     assert light == "rgb(255, 255, 255)"
     assert dark != light
@@ -248,7 +247,7 @@ def background(page: Page) -> str:
 def test_print_has_the_whole_picture_on_white_and_everything_as_text(
     open_file: Open, tmp_path: Path
 ) -> None:
-    page = open_file(written(tmp_path), color_scheme="dark").page
+    page = open_file(written(tmp_path), color_scheme="dark")
     page.click("[data-zoom=in]")
     page.emulate_media(media="print")
     assert background(page) == "rgb(255, 255, 255)"
@@ -270,7 +269,7 @@ def test_a_page_with_diagnostics_shows_them(open_file: Open, tmp_path: Path) -> 
     graph = build_graph(scene_of([loading.system], loading.diagnostics))
     path = tmp_path / "broken.html"
     path.write_bytes(render([graph], Format.HTML))
-    page = open_file(path).page
+    page = open_file(path)
     assert page.locator("[role=tab]").count() == 0
     page.click(thing("node:/one"))
     assert "depends on 'two'" in page.inner_text("#details .diagnostic")
@@ -280,7 +279,7 @@ def test_a_page_with_diagnostics_shows_them(open_file: Open, tmp_path: Path) -> 
 def test_texts_stay_in_their_boxes_with_the_fonts_of_the_browser(
     count: int, open_file: Open, tmp_path: Path
 ) -> None:
-    page = open_file(written(tmp_path, f"fleet_{count}")).page
+    page = open_file(written(tmp_path, f"fleet_{count}"))
     for view in View:
         page.click(f"#tab-{view}")
         outside = page.evaluate(
@@ -306,7 +305,7 @@ def test_texts_stay_in_their_boxes_with_the_fonts_of_the_browser(
 def test_three_hundred_nodes_open_as_a_whole_and_are_quick_to_use(
     open_file: Open, tmp_path: Path
 ) -> None:
-    page = open_file(written(tmp_path, "fleet_300")).page
+    page = open_file(written(tmp_path, "fleet_300"))
     for view in View:
         page.click(f"#tab-{view}")
         frame, drawn = (box_of(page, f"#view-{view} .{part}") for part in ("picture", "world"))
@@ -325,7 +324,7 @@ def test_three_hundred_nodes_open_as_a_whole_and_are_quick_to_use(
 
 
 def test_a_namespace_takes_those_in_it_along(open_file: Open, tmp_path: Path) -> None:
-    page = open_file(written(tmp_path, "fleet_30")).page
+    page = open_file(written(tmp_path, "fleet_30"))
     page.click(".filter summary")
     page.uncheck("input[name=namespace][value='/']")
     assert visible_keys(page) == set()
@@ -339,7 +338,7 @@ def test_a_namespace_takes_those_in_it_along(open_file: Open, tmp_path: Path) ->
 def test_the_details_do_not_hide_what_they_are_about(
     width: int, open_file: Open, tmp_path: Path
 ) -> None:
-    page = open_file(written(tmp_path)).page
+    page = open_file(written(tmp_path))
     page.set_viewport_size({"width": width, "height": 900})
     page.click(thing(PLANNER))
     box, panel = box_of(page, thing(PLANNER)), box_of(page, "#details")

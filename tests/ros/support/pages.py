@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Any
 
+from tests.chromium import without_complaints
 from tests.ros.support.dashboard import Address
 
 if TYPE_CHECKING:
@@ -43,31 +44,13 @@ def allowed(browser: Browser, address: Address) -> Iterator[BrowserContext]:
         yield context
 
 
-@contextmanager
-def watched(page: Page, address: Address) -> Iterator[Page]:
+def watched(page: Page, address: Address) -> AbstractContextManager[Page]:
     """Return a page for the length of the block.
 
     At the end, it must not have complained, nor requested anything beyond the server.
     """
-    complaints: list[str] = []
-    requests: list[str] = []
-    listeners: dict[Any, Callable[[Any], None]] = {
-        "console": lambda message: complaints.append(message.text),
-        "pageerror": lambda error: complaints.append(str(error)),
-        "request": lambda request: requests.append(request.url),
-        "websocket": lambda socket: requests.append(socket.url),
-    }
-    for event, listener in listeners.items():
-        page.on(event, listener)
-    try:
-        yield page
-        assert not complaints, complaints
-        own = (address.origin, f"ws://{address.host}/ws", f"blob:{address.origin}")
-        foreign = [url for url in requests if not url.startswith(own)]
-        assert not foreign, foreign
-    finally:
-        for event, listener in listeners.items():
-            page.remove_listener(event, listener)
+    own = (address.origin, f"ws://{address.host}/ws", f"blob:{address.origin}")
+    return without_complaints(page, lambda url: url.startswith(own))
 
 
 @contextmanager
