@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
+import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from composer.cli import main
 
@@ -42,6 +44,13 @@ def refused(code: int, *arguments: str) -> str:
     done = compose(*arguments)
     assert (done.code, done.out) == (code, ""), done.err
     return done.err
+
+
+def run_python(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a new interpreter; return its result, whatever the exit code."""
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, text=True, timeout=100, check=False, **options)
 
 
 def write_files(files: dict[str, str], folder: Path = Path()) -> None:

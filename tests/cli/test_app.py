@@ -19,7 +19,7 @@ from composer import cli
 from composer.cli.app import ELSEWHERE, application
 from composer.cli.program import INTERNAL
 from composer.cli.support.options import examples
-from tests.cli.compose import compose, refused, write_files
+from tests.cli.compose import compose, refused, run_python, write_files
 
 COMPOSE = [sys.executable, "-m", "composer"]
 REPOSITORY = Path(cli.__file__).parents[2]
@@ -138,21 +138,12 @@ def test_names_of_commands_of_other_tools_lead_to_ours() -> None:
         assert ours.replace(" --explain", "").split() in COMMANDS
 
 
-def in_shell(line: str, *words: str, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run a line of a shell, whose arguments are the words."""
-    return subprocess.run(
-        ["sh", "-c", line, "sh", *words],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        **options,
-    )
-
-
 def redirected(to: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a command with redirections of a shell."""
-    return in_shell(f'exec "$@" {to}', *COMPOSE, *arguments)
+    line = f"exec {shlex.join([*COMPOSE, *arguments])} {to}"
+    return subprocess.run(
+        line, shell=True, check=False, capture_output=True, text=True, timeout=100
+    )
 
 
 def test_standard_streams_can_be_closed() -> None:
@@ -173,24 +164,24 @@ def test_a_full_disk_is_not_an_internal_error(arguments: list[str]) -> None:
 def test_a_closed_pipe_ends_quietly() -> None:
     read, write = os.pipe()
     os.close(read)
-    command = [*COMPOSE, "export", "schema", "system"]
-    done = subprocess.run(command, check=False, stdout=write, stderr=subprocess.PIPE, text=True)
+    done = run_python("-m", "composer", "export", "schema", "system", stdout=write)
     os.close(write)
     assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_a_removed_working_directory_is_reported(folder: Path) -> None:
-    gone = folder / "gone"
-    gone.mkdir()
-    line = f"rmdir ../gone && {sys.executable} -P -m composer validate ."
-    done = in_shell(line, cwd=gone, env={**os.environ, "PYTHONPATH": str(REPOSITORY)})
+    code = "import os, sys; os.rmdir('../gone'); os.execv(sys.executable, sys.orig_argv[4:])"
+    (folder / "gone").mkdir()
+    command = [sys.executable, "-P", "-m", "composer", "validate", "."]
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    done = run_python("-P", "-c", code, *command, cwd="gone", env=environment)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "compose: the current working directory does not exist anymore\n"
 
 
 def test_python_m_composer_imports_nothing_from_the_current_folder(folder: Path) -> None:
     write_files({"signal.py": "import sys\nsys.exit('imported')\n"})
-    done = redirected("", "--version")
+    done = run_python("-m", "composer", "--version")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("compose ")
 
@@ -293,8 +284,7 @@ def test_only_what_is_needed_is_imported(
         f"for words in {commands!r}: main(words)\n"
         f"print({heavy!r} & set(sys.modules), file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stderr == f"{printed}set()\n"
+    assert run_python("-c", code).stderr == f"{printed}set()\n"
 
 
 def test_examples_are_printed_verbatim() -> None:

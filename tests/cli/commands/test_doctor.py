@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.cli.compose import compose
+from tests.cli.compose import compose, run_python
 
 #: Python without rclpy, as on a computer that has no ROS.
 WITHOUT_ROS = """
@@ -25,12 +24,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 def test_without_rclpy_everything_else_is_checked() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_ROS, "doctor", "--json"],
-        check=False,
-        capture_output=True,
-        text=True,
-    )
+    done = run_python("-c", WITHOUT_ROS, "doctor", "--json")
     assert done.returncode == 1, done.stderr
     found = {(item["area"], item["level"]): item for item in json.loads(done.stdout)}
     assert "rclpy is not installed" in found["versions", "error"]["message"]

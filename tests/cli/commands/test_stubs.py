@@ -5,15 +5,13 @@ from __future__ import annotations
 import ast
 import errno
 import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import pytest
 
 from composer.python_code.stubs.folder import HEADER
-from tests.cli.compose import compose, refused, write_files
+from tests.cli.compose import compose, refused, run_python, write_files
 
 TYPED = "typings/composer/typed.pyi"
 #: A system with a node that has a behavior and ports of its own.
@@ -67,8 +65,7 @@ def test_stubs_of_the_project_are_written_and_are_up_to_date(project: Path) -> N
 
 
 def test_a_behavior_runs_and_is_tested_without_the_stubs(project: Path) -> None:
-    command = [sys.executable, "-m", "pytest", "-q", "tests/test_counter_node.py"]
-    done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+    done = run_python("-m", "pytest", "-q", "tests/test_counter_node.py")
     assert done.returncode == 0, done.stdout
     code = (project / "nodes/counter.py").read_text()
     assert "from composer.typed import CounterBehavior" in code
@@ -84,9 +81,9 @@ def test_the_output_depends_on_the_given_files_only(project: Path) -> None:
     assert classes(project) == ["CounterBehavior"]
     written = []
     for seed in ("1", "2"):
-        command = [sys.executable, "-P", "-m", "composer", "stubs", "-o", seed]
         environment = {**os.environ, "PYTHONHASHSEED": seed}
-        subprocess.run(command, check=True, env=environment, capture_output=True)
+        done = run_python("-P", "-m", "composer", "stubs", "-o", seed, env=environment)
+        assert done.returncode == 0, done.stderr
         written.append(contents(project / seed))
     assert written[0] == written[1]
 

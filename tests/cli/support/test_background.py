@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from composer.cli.support.errors import CommandError
 from composer.cli.support.process import run_in_background
+from tests.cli.compose import run_python
 
 
 @pytest.fixture(autouse=True)
@@ -81,8 +80,7 @@ except CommandError as error:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
 def test_without_a_folder_for_the_log_the_variables_are_named() -> None:
-    command = [sys.executable, "-c", WITHOUT_HOME]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
+    done = run_python("-c", WITHOUT_HOME)
     assert done.stdout == (
         "there is no folder for the log: neither ROS_LOG_DIR nor HOME is set, and user 4242 has no"
         " home folder\nset ROS_LOG_DIR to a writable folder\n"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,7 +26,7 @@ from composer.client.systems import local_queries
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.requests import GraphAnswer, GraphQuery, GraphView
-from tests.cli.compose import compose, write_files
+from tests.cli.compose import compose, run_python, write_files
 
 
 def environment_of(words: tuple[str, ...]) -> dict[str, str]:
@@ -52,9 +50,7 @@ def complete(*words: str) -> list[str]:
 def test_a_program_of_its_own_completes() -> None:
     code = "import sys; from composer.cli import main; sys.exit(main())"
     environment = {**os.environ, **environment_of(("run", "--auto"))}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-    )
+    done = run_python("-c", code, env=environment)
     assert done.stdout.split() == ["--autostart"]
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from composer.cli.support.console import FileDescriptor, OutputQueue
+from tests.cli.compose import run_python
 
 LIMIT_S = 60.0
 
@@ -236,9 +237,7 @@ write("more data")
 
 
 def test_output_of_libraries_goes_to_stderr() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", NOISY], capture_output=True, text=True, check=True, timeout=100
-    )
+    done = run_python("-c", NOISY)
     assert done.stdout == "data\nmore data\n"
     assert done.stderr == "noise of a library\ntalk\n"
 
@@ -250,7 +249,6 @@ def test_messages_that_cannot_be_written_do_not_change_the_exit_code(target: str
     else:
         reading, writing = os.pipe()
         os.close(reading)
-    command = [sys.executable, "-m", "composer", "validate", "no_such_file.yaml"]
-    done = subprocess.run(command, stderr=writing, check=False, timeout=100)
+    done = run_python("-m", "composer", "validate", "no_such_file.yaml", stderr=writing)
     os.close(writing)
     assert done.returncode == 2

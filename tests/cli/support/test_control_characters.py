@@ -42,6 +42,11 @@ def test_columns_stay_aligned() -> None:
     assert combined == "e\u0301".ljust(column + 1) + "z"
     numbers = columns([("\u4e16", "1"), ("b", "10")], numbers_from=1)
     assert numbers.split("\n") == ["\u4e16   1", "b   10"]
+    rows = [("node", "sent"), ("/a/long/name", "7"), ("/b", "123")]
+    assert columns(rows, numbers_from=1) == (
+        "node          sent\n/a/long/name     7\n/b             123"
+    )
+    assert columns([("a", "b"), ("cc", "")]) == "a   b\ncc"
 
 
 @pytest.mark.parametrize("options", [(), ("--show-types",)])

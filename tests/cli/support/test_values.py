@@ -9,7 +9,7 @@ import yaml
 from composer.cli.commands.topic_receive import without_items
 from composer.cli.support.errors import UsageError
 from composer.cli.support.options import yaml_or_stdin
-from composer.cli.support.terminal import as_json, as_yaml, columns, truncated
+from composer.cli.support.terminal import as_json, as_yaml, truncated
 
 
 @pytest.mark.parametrize("value", [1.5, "text", "ends with...", True, None, [1, 2], {"a": ["b"]}])
@@ -30,14 +30,6 @@ def test_long_lists_and_strings_are_truncated() -> None:
     assert truncated(["abc", 5], max_length=3) == ["abc", 5]
     scan = {"ranges": [0.5, 1.5], "pose": {"x": 1.0}, "frame": "laser"}
     assert without_items(scan) == {**scan, "ranges": "<2 items>"}
-
-
-def test_columns_are_aligned_and_numbers_right_aligned() -> None:
-    rows = [("node", "sent"), ("/a/long/name", "7"), ("/b", "123")]
-    assert columns(rows, numbers_from=1) == (
-        "node          sent\n/a/long/name     7\n/b             123"
-    )
-    assert columns([("a", "b"), ("cc", "")]) == "a   b\ncc"
 
 
 def test_yaml_is_an_argument_or_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
