@@ -32,35 +32,17 @@ CONFIGURE = TransitionDescription(
     transition=Transition(id=Transition.TRANSITION_CONFIGURE, label="configure"),
     goal_state=State(id=State.TRANSITION_STATE_CONFIGURING, label="configuring"),
 )
-#: By the name of a service: its type, and what it answers.
+UNCONFIGURED = State(id=State.PRIMARY_STATE_UNCONFIGURED, label="unconfigured")
+DESCRIPTOR = ParameterDescriptor(name="speed", type=SPEED.type)
+#: The type of each service below the node, and what it answers.
 SERVICES = {
-    "forgetful/get_state": (
-        GetState,
-        GetState.Response(
-            current_state=State(id=State.PRIMARY_STATE_UNCONFIGURED, label="unconfigured")
-        ),
-    ),
-    "forgetful/get_available_transitions": (
-        GetAvailableTransitions,
-        GetAvailableTransitions.Response(available_transitions=[CONFIGURE]),
-    ),
-    "forgetful/change_state": (ChangeState, ChangeState.Response(success=True)),
-    "forgetful/list_parameters": (
-        ListParameters,
-        ListParameters.Response(result=ListParametersResult(names=["speed"])),
-    ),
-    "forgetful/describe_parameters": (
-        DescribeParameters,
-        DescribeParameters.Response(
-            descriptors=[ParameterDescriptor(name="speed", type=SPEED.type)]
-        ),
-    ),
-    "forgetful/get_parameters": (GetParameters, GetParameters.Response(values=[SPEED])),
-    "forgetful/set_parameters": (
-        SetParameters,
-        SetParameters.Response(results=[SetParametersResult(successful=True)]),
-    ),
-    "switch": (SetBool, SetBool.Response(success=True)),
+    "get_state": (GetState, {"current_state": UNCONFIGURED}),
+    "get_available_transitions": (GetAvailableTransitions, {"available_transitions": [CONFIGURE]}),
+    "change_state": (ChangeState, {"success": True}),
+    "list_parameters": (ListParameters, {"result": ListParametersResult(names=["speed"])}),
+    "describe_parameters": (DescribeParameters, {"descriptors": [DESCRIPTOR]}),
+    "get_parameters": (GetParameters, {"values": [SPEED]}),
+    "set_parameters": (SetParameters, {"results": [SetParametersResult(successful=True)]}),
 }
 
 
@@ -72,12 +54,15 @@ class Forgetful(Node):
     def __init__(self) -> None:
         super().__init__("forgetful", namespace="/lab", start_parameter_services=False)
         self.asked: set[str] = set()
-        for name, (service, response) in SERVICES.items():
-            self.create_service(service, name, partial(self.answer, name, response))
+        for name, (kind, fields) in SERVICES.items():
+            answer = partial(self.answer, name, kind.Response(**fields))
+            self.create_service(kind, f"~/{name}", answer)
+        answer = partial(self.answer, "switch", SetBool.Response(success=True))
+        self.create_service(SetBool, "switch", answer)
         self.create_subscription(String, "in", lambda _: None, 10)
 
     def answer(self, name: str, response: Any, *_: Any) -> Any:
-        print(name.rpartition("/")[2], flush=True)
+        print(name, flush=True)
         if name not in self.asked:
             self.asked.add(name)
             raise Forgotten
