@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -177,3 +177,44 @@ def error(*arguments: object) -> str:
     """Run a command that must fail with an empty stdout; return its stderr."""
     (text,) = errors(arguments)
     return text
+
+
+class Observer:
+    """A plain rclpy process that says which nodes it knows, and how many messages it received."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+
+    def wait_until_ready(self) -> None:
+        """Wait until it knows the nodes that it expects."""
+        assert self._process.stdout is not None
+        # Fast DDS may print there first, about what a killed process left behind.
+        assert "ready\n" in self._process.stdout
+
+    def ask(self) -> tuple[int, list[str]]:
+        """Return the number of messages that it has received, and the nodes that it knows."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        count, *names = self._process.stdout.readline().split()
+        return int(count), names
+
+
+@contextmanager
+def observing(
+    topic: str, *nodes: str, environment: Mapping[str, str], prefix: tuple[str, ...] = ()
+) -> Iterator[Observer]:
+    """Run one that expects ``nodes``; ``prefix`` is a command that runs it elsewhere."""
+    process = subprocess.Popen(
+        [*prefix, sys.executable, str(PROGRAMS / "roles.py"), "observer", topic, *nodes],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
+    try:
+        yield Observer(process)
+    finally:
+        process.kill()
+        process.wait()

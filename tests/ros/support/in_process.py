@@ -47,8 +47,7 @@ from composer.runtime.supervision.events import (
     Outcome,
     StateChanged,
 )
-from tests.ros.support.leaving import leave
-from tests.ros.support.service_calls import ServiceUser, ids_of
+from tests.ros.support.service_calls import ServiceUser, ids_of, leave
 
 #: Longer than a participant is known whose goodbye message was lost: 20 s.
 PATIENCE_S = 60.0

@@ -18,7 +18,7 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken
 from composer.runtime.executors.tasks import Report
 from tests.ros.support.forked import ForkedProgram
-from tests.ros.support.leaving import leave
+from tests.ros.support.service_calls import leave
 
 PEER = Path(__file__).parents[1] / "programs" / "loop_peer.py"
 PATIENCE_S = 60.0

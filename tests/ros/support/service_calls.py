@@ -1,4 +1,4 @@
-"""Calls of services whose responses cannot be lost.
+"""Calls of services by hand-written nodes, whose responses cannot be lost.
 
 A server of rmw_fastrtps drops its response if it has not discovered the client within 0.1 s. A
 client is therefore kept, and used once the process of the server is known to have discovered it.
@@ -14,7 +14,7 @@ from typing import Any
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters
-from rclpy.action import ActionClient
+from rclpy.action import ActionClient, ActionServer
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -241,3 +241,15 @@ class Acquaintance:
                 for process in found & participants:
                     yield process, (name, _SAFE[types[0]])
                 participants = participants - found
+
+
+def leave(node: Node) -> None:
+    """Destroy a hand-written node with its actions.
+
+    rclpy's ``destroy_node`` does not destroy actions, which keep the node and its participant until
+    a garbage collection.
+    """
+    for waitable in list(node.waitables):
+        if isinstance(waitable, (ActionClient, ActionServer)):
+            waitable.destroy()
+    node.destroy_node()
