@@ -1,4 +1,4 @@
-"""Mutations of valid files: keys and values are removed, renamed, moved and replaced."""
+"""Located trees, and mutations of valid files: keys and values are removed, moved and replaced."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import copy
 from typing import Any
 
 from hypothesis import strategies as st
+
+from composer.base.source import SourceFile, Span
+from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree
 
 #: Replacement values, mostly of a wrong type.
 VALUES: st.SearchStrategy[Any] = st.one_of(
@@ -139,3 +142,33 @@ def spliced(draw: st.DrawFn, texts: list[str]) -> str:
                 rest = piece[0][place + draw(st.integers(0, 4)) :]
                 lines[start] = f"{piece[0][:place]}{written}{rest}"
     return "".join(lines)
+
+
+SOURCE = SourceFile("robot.yaml", "")
+SPAN = Span(SOURCE, 1, 1)
+
+
+def maps(
+    keys: st.SearchStrategy[str], values: st.SearchStrategy[Tree], most: int
+) -> st.SearchStrategy[Mapping]:
+    """Draw maps of at most ``most`` entries."""
+    return st.dictionaries(keys, values, max_size=most).map(
+        lambda items: Mapping(
+            tuple(Entry(Scalar(name, SPAN), value) for name, value in items.items()), SPAN
+        )
+    )
+
+
+def trees(
+    keys: st.SearchStrategy[str], scalars: st.SearchStrategy[ScalarValue], most: int, leaves: int
+) -> st.SearchStrategy[Tree]:
+    """Draw trees of about ``leaves`` scalars, in maps and lists of at most ``most``."""
+
+    def lists(inner: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
+        return st.lists(inner, max_size=most).map(lambda items: Sequence(tuple(items), SPAN))
+
+    return st.recursive(
+        scalars.map(lambda value: Scalar(value, SPAN)),
+        lambda inner: maps(keys, inner, most) | lists(inner),
+        max_leaves=leaves,
+    )

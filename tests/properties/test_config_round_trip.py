@@ -19,7 +19,7 @@ from composer.loading import gives_same_model, load
 from composer.loading.reported import LoadResult
 from composer.model.assembly.canonical import canonical
 from tests.examples import examples
-from tests.properties.trees import maps, trees
+from tests.properties.mutation import maps, trees
 from tests.properties.validating import SHIPPED
 
 #: Systems that can be included anywhere, with arguments and nodes to override.

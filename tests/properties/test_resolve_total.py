@@ -14,7 +14,7 @@ from composer.plan import bring_up, tear_down
 from composer.project import Project
 from composer.project.node_types import NodeTypes
 from tests.examples import examples
-from tests.properties.trees import SOURCE, SPAN, maps, trees
+from tests.properties.mutation import SOURCE, SPAN, maps, trees
 
 FOLDER = Path("/nowhere")
 
