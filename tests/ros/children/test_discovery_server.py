@@ -14,15 +14,16 @@ import pytest
 
 from tests.ros.support.commands import (
     PATIENCE_S,
+    Observer,
     Running,
     code_of_end,
     compose,
     listed,
+    observing,
     running,
     start,
 )
 from tests.ros.support.in_process import wait_until
-from tests.ros.support.observers import Observer, observing
 from tests.ros.support.system_process import write_system
 
 SYSTEM = """

@@ -216,7 +216,7 @@ def test_states_are_published_latched_on_change_and_every_second(
 def test_a_second_instance_is_refused_and_no_status_is_lost(tmp_path: Path, peer: Peer) -> None:
     def lost() -> int:
         """Count the messages that ``ros2 topic echo`` reports as replaced before it got them."""
-        with hand_written("hand_written_echo.py", "/fleet/robot/manager/state") as process:
+        with hand_written("roles.py", "echo", "/fleet/robot/manager/state") as process:
             assert process.stdout is not None
             return int(process.stdout.readline())
 

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.ros.network.namespaces import PATIENCE_S, Computer, network
-from tests.ros.support.commands import PROGRAMS
-from tests.ros.support.observers import Observer, observing
+from tests.ros.support.commands import PROGRAMS, Observer, observing
 
 COMPOSE = (sys.executable, "-m", "composer")
 SYSTEM = """

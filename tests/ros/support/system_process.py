@@ -11,18 +11,15 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from textwrap import dedent
-from types import TracebackType
 from typing import Any, TypeVar
 
-from lifecycle_msgs.srv import ChangeState, GetState
-from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from tests.ros.support.forked import ForkedCommand
-from tests.ros.support.service_calls import ServiceClients
+from tests.ros.support.service_calls import ServiceUser
 
 T = TypeVar("T")
 
@@ -72,12 +69,7 @@ class RunningSystem:
     def __enter__(self) -> RunningSystem:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _traceback: object) -> None:
         self._end()
         self._reader.join()
         if error is not None:
@@ -137,19 +129,21 @@ class RunningSystem:
         return self.process.wait(timeout=PATIENCE_S)
 
 
-class ExternalNode:
+class ExternalNode(ServiceUser):
     """A plain rclpy node that is external to the system."""
 
     def __init__(self, context: Context) -> None:
-        self.node = Node("external_node", context=context)
+        super().__init__(Node("external_node", context=context))
         self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
-        self._services = ServiceClients(self.node, lambda condition, _: self.spin_until(condition))
 
     def close(self) -> None:
         """Leave the ROS graph."""
         self.executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
+
+    def wait_until(self, condition: Callable[[], Any], what: str = "") -> None:
+        self.spin_until(condition)
 
     def spin_until(self, condition: Callable[[], bool], timeout_s: float = PATIENCE_S) -> None:
         """Spin until the condition holds."""
@@ -170,28 +164,6 @@ class ExternalNode:
         self.spin_until(future.done, timeout_s)
         return future.result()
 
-    def call(self, service_type: Any, name: str, request: Any) -> Any:
-        """Call a service and return its response; see :class:`.ServiceClients`."""
-        return self._services.call(service_type, name, request)
-
-    def action_client(self, kind: Any, name: str) -> ActionClient:
-        """Return a client whose responses are not lost."""
-        client = ActionClient(self.node, kind, name)
-        self.spin_until(client.server_is_ready)
-        self._services.wait_until_acquainted(f"{name}/_action/send_goal")
-        return client
-
-    def state(self, node: str) -> str:
-        """Return the label of a node's lifecycle state."""
-        response = self.call(GetState, f"{node}/get_state", GetState.Request())
-        return str(response.current_state.label)
-
     def wait_for_state(self, node: str, state: str) -> None:
         """Wait until the node has the state."""
         self.spin_until(lambda: self.state(node) == state)
-
-    def change_state(self, node: str, label: str) -> bool:
-        """Request a transition by its label."""
-        request = ChangeState.Request()
-        request.transition.label = label
-        return bool(self.call(ChangeState, f"{node}/change_state", request).success)
