@@ -1,4 +1,4 @@
-"""The commands for the ROS graph, with a system that runs in another process."""
+"""The commands for the ROS graph, and an access control policy, with a running pipeline."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import json
 import re
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from fnmatch import fnmatchcase
 from itertools import product
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from std_msgs.msg import String
 
+from composer.bridges.export.sros2 import SELF_TEST_TOPICS
 from composer.client.graph_names import GraphNames
 from composer.client.session import Deadline, Session
 from composer.client.systems.local_queries import (
@@ -23,12 +26,15 @@ from composer.client.systems.local_queries import (
     local_report,
     local_reports,
 )
+from composer.runtime.intra_process import ignore_local_publications
 from composer.runtime.protocol.requests import KINDS
 from tests.ros.support.commands import (
     PATIENCE_S,
     compose,
     hand_written,
     listed,
+    output_of,
+    repeated_until,
     running,
 )
 from tests.ros.support.in_process import Peer, wait_until
@@ -160,3 +166,62 @@ def test_doctor_reports_no_problems() -> None:
     assert [item for item in found if item["level"] in ("warning", "error")] == []
     (graph,) = (item["message"] for item in found if item["area"] == "graph")
     assert graph.startswith(compatible)
+
+
+#: The sections of 'compose node info', and the rules of a policy.
+RULES = {
+    "publishers": ("topics", "publish"),
+    "subscriptions": ("topics", "subscribe"),
+    "services": ("services", "reply"),
+    "clients": ("services", "request"),
+    "action_servers": ("actions", "execute"),
+    "action_clients": ("actions", "call"),
+}
+#: What is used at the start, with simulated time, or if another process runs the system.
+UNUSED = [SELF_TEST_TOPICS, SELF_TEST_TOPICS, "/clock", "/pipeline/manager/_instance_*"]
+
+
+def rules_of(profile: ElementTree.Element) -> dict[str, set[str]]:
+    """Return the rules of a node's policy by the sections of 'compose node info'."""
+    return {
+        section: {
+            element.text or ""
+            for group in profile.findall(kind)
+            if group.get(attribute) == "ALLOW"
+            for element in group
+        }
+        for section, (kind, attribute) in RULES.items()
+    }
+
+
+def differences(rules: Mapping[str, set[str]], text: str) -> tuple[list[str], list[str]]:
+    """Return the endpoints in the output of 'compose node info' without rules, and unused rules."""
+    refused: list[str] = []
+    unused: list[str] = []
+    for section, patterns in rules.items():
+        found = {item for item, _ in json.loads(text)[section] if "/_action/" not in item}
+        refused += [item for item in found if not any(fnmatchcase(item, r) for r in patterns)]
+        unused += [r for r in patterns if not any(fnmatchcase(item, r) for item in found)]
+    return refused, unused
+
+
+def test_the_policy_of_a_system_allows_every_endpoint_and_no_other() -> None:
+    assert f"/{ignore_local_publications.TEST_NODE}/*" == SELF_TEST_TOPICS
+    root = ElementTree.fromstring(output_of("export", "sros2", "systems/pipeline.yaml"))
+    profiles = {
+        f"{item.get('ns', '').rstrip('/')}/{item.get('node')}": rules_of(item)
+        for item in root.findall("enclaves/enclave/profiles/profile")
+    }
+    # A peer of another test may still be there.
+    repeated_until(lambda text: text.split() == sorted(profiles), "node", "list")
+    all_unused = []
+    for name, rules in profiles.items():
+
+        def is_complete(text: str) -> bool:
+            return set(differences(rules, text)[1]) <= set(UNUSED)  # noqa: B023
+
+        info = repeated_until(is_complete, "node", "info", name, "--json", "-a")
+        refused, unused = differences(rules, info)
+        assert refused == [], name
+        all_unused += unused
+    assert sorted(all_unused) == UNUSED

@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -42,13 +42,13 @@ class Service:
         settings = [line.split("=", 1) for line in lines if "=" in line]
         (command,) = (value for name, value in settings if name == "ExecStart")
         variables = (shlex.split(value)[0] for name, value in settings if name == "Environment")
-        address = folder / unit.stem
+        self.address = folder / unit.stem
         self.messages = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self.messages.bind(str(address))
+        self.messages.bind(str(self.address))
         self.messages.settimeout(PATIENCE_S)
         environment = dict(variable.split("=", 1) for variable in variables)
         environment |= {name: os.environ[name] for name in ("PATH", "HOME")}
-        environment["NOTIFY_SOCKET"] = str(address)
+        environment["NOTIFY_SOCKET"] = str(self.address)
         self.process = subprocess.Popen(
             shlex.split(command), env=environment, stderr=subprocess.PIPE, text=True
         )
@@ -72,6 +72,7 @@ def started(unit: Path, folder: Path) -> Iterator[Service]:
         service.process.kill()
         service.process.communicate()
         service.messages.close()
+        service.address.unlink()
 
 
 def is_ready(system: str) -> bool:
@@ -82,45 +83,34 @@ def wait_until_ready(system: str) -> None:
     wait_until(lambda: is_ready(system), f"{system} to be ready")
 
 
-@pytest.fixture
-def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the exported system; commands run as in a shell of a login session."""
+def test_services_become_ready_obey_commands_and_stop_in_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Commands run as in a shell of a login session.
     monkeypatch.setenv("XDG_RUNTIME_DIR", f"/run/user/{os.geteuid()}")
-    file = tmp_path / "robot.yaml"
+    file, units = tmp_path / "robot.yaml", tmp_path / "units"
     file.write_text(SYSTEM)
-    done = compose("export", "systemd", file, "-o", tmp_path / "units")
+    done = compose("export", "systemd", file, "-o", units)
     assert done.returncode == 0, done.stderr
-    return file
-
-
-def test_commands_of_a_shell_reach_services(file: Path, tmp_path: Path) -> None:
-    with ExitStack() as stack:
-        units = (tmp_path / "units" / f"{name}.service" for name in ("robot-ears", "robot"))
-        ears, robot = (stack.enter_context(started(unit, tmp_path)) for unit in units)
-        wait_until_ready("/fleet/robot")
-        assert compose("ps").stdout.count("/fleet/listener") == 1
-        for options, name in (((), "/fleet/robot"), (("--process", "ears"), "/fleet/robot/ears")):
-            second = compose("run", file, *options)
-            assert second.returncode == 1
-            assert f"system '{name}' already runs in ROS domain" in second.stderr
-            assert "shutting down" not in second.stderr  # it has not started anything
-        assert is_ready("/fleet/robot")
-        assert compose("down", "/fleet/robot").returncode == 0
-        assert robot.process.wait(PATIENCE_S) == 0
-        assert ears.stop() == 0
-
-
-def test_services_become_ready_and_stop_in_order(file: Path, tmp_path: Path) -> None:
-    with ExitStack() as stack:
-        unit = tmp_path / "units" / "robot-ears.service"
-        ears = stack.enter_context(started(unit, tmp_path))
+    with started(units / "robot-ears.service", tmp_path) as ears:
         ears.wait_for("READY=1")
         assert not is_ready("/fleet/robot/ears")  # nothing has brought its nodes up
-        robot = stack.enter_context(started(tmp_path / "units" / "robot.service", tmp_path))
-        robot.wait_for("READY=1")
-        wait_until_ready("/fleet/robot")
-        wait_until_ready("/fleet/robot/ears")  # although one of its nodes is to be inactive
-        robot.wait_for("WATCHDOG=1")
-        assert robot.stop() == 0
+        with started(units / "robot.service", tmp_path) as robot:
+            robot.wait_for("READY=1")
+            wait_until_ready("/fleet/robot")
+            wait_until_ready("/fleet/robot/ears")  # although one of its nodes is to be inactive
+            robot.wait_for("WATCHDOG=1")
+            assert compose("ps").stdout.count("/fleet/listener") == 1
+            for options, name in (((), ""), (("--process", "ears"), "/ears")):
+                second = compose("run", file, *options)
+                assert second.returncode == 1
+                assert f"system '/fleet/robot{name}' already runs in ROS domain" in second.stderr
+                assert "shutting down" not in second.stderr  # it has not started anything
+            assert is_ready("/fleet/robot")
+            assert robot.stop() == 0
         wait_until(lambda: not is_ready("/fleet/robot/ears"), "the nodes to be brought down")
+        with started(units / "robot.service", tmp_path) as robot:
+            wait_until_ready("/fleet/robot")
+            assert compose("down", "/fleet/robot").returncode == 0
+            assert robot.process.wait(PATIENCE_S) == 0
         assert ears.stop() == 0

@@ -15,6 +15,25 @@ import pytest
 
 from tests.ros.support.commands import PATIENCE_S, errors, hand_written, listed, start
 
+READS = {
+    "lifecycle list forgetful": "configure\n",
+    "lifecycle nodes": "/lab/forgetful  unconfigured\n",
+    "param get forgetful speed": "1.5\n",
+    "param describe forgetful speed": "name:  speed\ntype:  double\n",
+}
+SERVICES_OF_READS = (
+    "get_available_transitions",
+    "get_state",
+    "list_parameters",
+    "get_parameters",
+    "describe_parameters",
+)
+WRITES = {
+    "service call /lab/switch": "switch",
+    "lifecycle set forgetful configure": "change_state",
+    "param set forgetful speed 2": "set_parameters",
+}
+
 
 @pytest.fixture
 def forgetful(ros_domain_id: int) -> Iterator[subprocess.Popen[str]]:
@@ -22,52 +41,20 @@ def forgetful(ros_domain_id: int) -> Iterator[subprocess.Popen[str]]:
         yield process
 
 
-def requests(process: subprocess.Popen[str]) -> Counter[str]:
-    """End the peer; return how many requests each of its services received."""
-    process.kill()
-    assert process.stdout is not None
-    return Counter(process.stdout.read().split())
-
-
-@pytest.mark.parametrize(
-    ("command", "expected", "services"),
-    [
-        ("lifecycle list forgetful", "configure\n", ["get_available_transitions"]),
-        ("lifecycle nodes", "/lab/forgetful  unconfigured\n", ["get_state"]),
-        ("param get forgetful speed", "1.5\n", ["list_parameters", "get_parameters"]),
-        (
-            "param describe forgetful speed",
-            "name:  speed\ntype:  double\n",
-            ["list_parameters", "describe_parameters"],
-        ),
-    ],
-)
-def test_reads_are_retried(
-    forgetful: subprocess.Popen[str], command: str, expected: str, services: list[str]
-) -> None:
-    assert listed((expected,), *command.split(), "--timeout", "20") == expected
-    received = requests(forgetful)
-    assert all(received[service] >= 2 for service in services), received
-
-
-def test_writes_are_sent_once(forgetful: subprocess.Popen[str]) -> None:
-    commands = {
-        "service call /lab/switch": "switch",
-        "lifecycle set forgetful configure": "change_state",
-        "param set forgetful speed 2": "set_parameters",
-    }
-    # With a second request, the command would succeed.
-    for text in errors(*((*command.split(), "--timeout", "8") for command in commands)):
+def test_reads_are_retried_and_writes_are_sent_once(forgetful: subprocess.Popen[str]) -> None:
+    for command, expected in READS.items():
+        assert listed((expected,), *command.split(), "--timeout", "20") == expected
+    # With a second request, these commands would succeed.
+    for text in errors(*((*command.split(), "--timeout", "8") for command in WRITES)):
         assert "did not respond within 8 s" in text
-    received = requests(forgetful)
-    assert {service: received[service] for service in commands.values()} == dict.fromkeys(
-        commands.values(), 1
-    )
+    forgetful.kill()
+    assert forgetful.stdout is not None
+    received = Counter(forgetful.stdout.read().split())
+    assert [received[service] for service in WRITES.values()] == [1] * len(WRITES)
+    assert all(received[service] >= 2 for service in SERVICES_OF_READS), received
 
 
-def test_a_missing_acknowledgment_prints_a_warning(
-    forgetful: subprocess.Popen[str],
-) -> None:
+def test_a_missing_acknowledgment_prints_a_warning(forgetful: subprocess.Popen[str]) -> None:
     # Slow, so that the peer stops between the two messages, also on a busy machine.
     arguments = ("--times", "2", "--rate", "0.25", "/lab/in", "std_msgs/msg/String")
     process = start("topic", "pub", *arguments)
