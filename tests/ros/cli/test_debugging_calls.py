@@ -1,4 +1,4 @@
-"""The commands for services, actions and parameters, with a plain rclpy node."""
+"""Services, actions, parameters and wrong names in commands, with a plain rclpy node."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from tests.ros.support.commands import (
     PATIENCE_S,
     compose,
     error,
+    errors,
     expect_error,
+    expect_errors,
     finished,
     listed,
     repeated,
@@ -52,18 +54,16 @@ def test_actions() -> None:
     assert json.loads(relative) == info
 
 
+NAVIGATE = ("action", "send-goal", "/lab/navigate")
+ENDLESS = (*NAVIGATE, "{max_velocity: -1}", "--json")
+
+
 def test_a_goal_prints_feedback_and_the_result() -> None:
-    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
+    goal = (*NAVIGATE, "{max_velocity: 1.0}", "--feedback", "--json")
     # The first feedback may be sent before the subscription is matched.
     text = repeated_until(lambda text: text.count('"feedback"') == 3, *goal)
-    printed = [json.loads(line) for line in text.splitlines()]
-    assert [item["feedback"]["progress_percent"] for item in printed[:-1]] == [0.0, 1.0, 2.0]
-    assert printed[-1]["status"] == "succeeded"
-    assert printed[-1]["result"]["distance_traveled"] == 2.5
-
-
-def test_feedback_that_arrives_with_the_result_is_printed() -> None:
-    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: 1.0}", "--feedback", "--json")
+    check_goal([json.loads(line) for line in text.splitlines()])
+    # Feedback that arrives with the result is printed as well.
     process = start(*goal, "--timeout", "20")
     assert process.stdout is not None
     first = json.loads(next(line for line in process.stdout if "feedback" in line))
@@ -72,25 +72,23 @@ def test_feedback_that_arrives_with_the_result_is_printed() -> None:
     process.send_signal(signal.SIGCONT)
     printed = [first, *map(json.loads, process.stdout)]
     finished(process)
-    assert [item["feedback"]["progress_percent"] for item in printed[:-1]] == [0.0, 1.0, 2.0]
-    assert printed[-1]["status"] == "succeeded"
+    check_goal(printed)
 
 
-def test_a_rejected_goal_is_reported() -> None:
-    goal = ("action", "send-goal", "/lab/navigate", "composer_interfaces/action/Navigate", "{}")
-    expect_error("'/lab/navigate' rejected the goal", *goal)
+def check_goal(printed: list[dict[str, Any]]) -> None:
+    *feedback, last = printed
+    assert [item["feedback"]["progress_percent"] for item in feedback] == [0.0, 1.0, 2.0]
+    assert (last["status"], last["result"]["distance_traveled"]) == ("succeeded", 2.5)
 
 
-def test_a_goal_that_takes_too_long_is_canceled() -> None:
-    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--json")
-    done = repeated(lambda done: "canceled" in done.stdout, *goal, "--result-timeout", "0.3")
+def test_goals_are_rejected_and_canceled() -> None:
+    kind = "composer_interfaces/action/Navigate"
+    expect_error("'/lab/navigate' rejected the goal", *NAVIGATE, kind, "{}")
+    limit = ("--result-timeout", "0.3")
+    done = repeated(lambda done: "canceled" in done.stdout, *ENDLESS, *limit)
     assert done.returncode == 1, done.stderr
     assert json.loads(done.stdout)["status"] == "canceled"
-
-
-def test_ctrl_c_cancels_a_goal() -> None:
-    goal = ("action", "send-goal", "/lab/navigate", "{max_velocity: -1}", "--feedback", "--json")
-    process = start(*goal, "--timeout", "20")
+    process = start(*ENDLESS, "--feedback", "--timeout", "20")
     assert process.stdout is not None
     assert any("feedback" in line for line in process.stdout)
     process.send_signal(signal.SIGINT)
@@ -123,16 +121,17 @@ def test_parameters_can_be_read_and_set() -> None:
 
 
 def test_rejected_parameters_are_reported_with_the_reason() -> None:
-    expect_error("out of range", "param", "set", "talker", "speed", "-99")
-    text = compose("param", "set", "talker", "gains", "[3").stderr
+    setting = ("param", "set", "talker")
+    text = compose(*setting, "gains", "[3").stderr
     assert text == "compose: '[3' is not YAML: expected ',' or ']', but got '<stream end>'\n"
-    wrong = "parameter 'speed' has type double, got 'fast'"
-    expect_error(wrong, "param", "set", "talker", "speed", "fast")
     large = f"[{2**63}]"
-    wrong = f"parameter 'counts' has type integer_array, got {large}"
-    expect_error(wrong, "param", "set", "talker", "counts", large)
-    expect_error("did you mean 'speed'?", "param", "set", "talker", "sped", "1")
-    expect_error("did you mean '/lab/talker'?", "param", "list", "taker")
+    expect_errors(
+        ("out of range", *setting, "speed", "-99"),
+        ("parameter 'speed' has type double, got 'fast'", *setting, "speed", "fast"),
+        (f"parameter 'counts' has type integer_array, got {large}", *setting, "counts", large),
+        ("did you mean 'speed'?", *setting, "sped", "1"),
+        ("did you mean '/lab/talker'?", "param", "list", "taker"),
+    )
 
 
 def test_a_call_is_repeated_until_ctrl_c() -> None:
@@ -146,24 +145,21 @@ def test_a_call_is_repeated_until_ctrl_c() -> None:
     assert process.returncode == 130
 
 
-def test_a_parameter_is_described() -> None:
-    assert json.loads(listed(("speed",), "param", "describe", "talker", "speed", "--json")) == {
+def test_parameters_are_listed_and_described() -> None:
+    describe = ("param", "describe", "talker", "speed")
+    speed = json.loads(listed(("speed",), *describe, "--json"))
+    assert speed == {
         "name": "speed",
         "type": "double",
         "description": "How fast.",
         "minimum": 0.0,
         "maximum": 5.0,
     }
-
-
-def test_parameters_of_all_nodes_are_listed_and_several_described() -> None:
+    several = json.loads(listed(("speed",), *describe, "name", "--json"))
+    assert [item["name"] for item in several] == ["speed", "name"]
     everything = json.loads(listed(("/lab/talker",), "param", "list", "--json"))
     assert {"speed", "name", "gains"} <= set(everything["/lab/talker"])
-    head = "/lab/talker:\n"
-    listed((head,), "param", "list")
-    describe = ("param", "describe", "talker", "speed", "name", "--json")
-    several = json.loads(listed(("speed",), *describe))
-    assert [item["name"] for item in several] == ["speed", "name"]
+    listed(("/lab/talker:\n",), "param", "list")
 
 
 def test_a_dump_can_be_loaded(tmp_path: Path) -> None:
@@ -191,3 +187,45 @@ def test_parameter_files_can_nest_names_and_use_wildcards(tmp_path: Path) -> Non
     expect_error("has no parameters for /lab/talker", *load)
     file.write_text("/lab/talker: {speed: 1.0}\n")
     expect_error("RC043 parameter-file", *load)
+
+
+PUBLISH = ("topic", "pub", "/lab/in")
+
+
+def test_unknown_types() -> None:
+    at_once = ("--once", "-w", "0")
+    send_goal = ("action", "send-goal", "/lab/navigate")
+    expect_errors(
+        ("did you mean 'std_msgs/msg/String'?", *PUBLISH, "String", *at_once),
+        ("did you mean 'std_msgs/msg/String'?", *PUBLISH, "std_msgs/msg/Strin"),
+        ("install the package that defines it", *PUBLISH, "nowhere/msg/Text"),
+        ("is not a message type", *PUBLISH, "std_srvs/srv/SetBool"),
+        ("is not a message type", "topic", "echo", "/lab/in", "std_srvs/srv/SetBool"),
+        ("is not a service type", "service", "call", "/lab/add", "std_msgs/msg/String"),
+        ("is not an action type", *send_goal, "std_srvs/srv/SetBool"),
+    )
+
+
+def test_invalid_names() -> None:
+    words = (
+        ("topic", "echo", "a topic", "std_msgs/msg/String"),
+        ("topic", "hz", "a topic"),
+        ("topic", "info", "a topic"),
+        ("topic", "pub", "a topic", "std_msgs/msg/String"),
+        ("service", "call", "a service", "std_srvs/srv/SetBool"),
+        ("action", "send-goal", "an action", "composer_interfaces/action/Navigate"),
+    )
+    for (kind, _, name, *_), text in zip(words, errors(*words), strict=True):
+        assert f"{kind} name '/{name}' contains a space" in text
+
+
+def test_types_that_other_nodes_do_not_use() -> None:
+    number, text, truth = (f"std_msgs/msg/{name}" for name in ("Int32", "String", "Bool"))
+    switch, trigger = "std_srvs/srv/SetBool", "std_srvs/srv/Trigger"
+    echo, publish = ("topic", "echo", "/lab/count"), ("topic", "pub", "/lab/count")
+    call = ("service", "call", "/lab/add")
+    expect_errors(
+        (f"other nodes use type {number}, not {text}\n", *echo, text, "--timeout", "5"),
+        (f"other nodes use type {number}, not {truth}\n", *publish, truth, "--once"),
+        (f"other nodes use type {switch}, not {trigger}\n", *call, trigger),
+    )

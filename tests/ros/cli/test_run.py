@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
+from std_msgs.msg import Int64
 
 from tests.cli.compose import compose as in_process
-from tests.ros.support.commands import (
-    PATIENCE_S,
-    compose,
-    listed,
-    running,
-    start,
-)
+from tests.ros.support.commands import COMPOSE, PATIENCE_S, compose, listed, running, start
 from tests.ros.support.in_process import Peer, wait_until
 
 
@@ -162,73 +160,55 @@ def test_run_in_the_background_gets_the_same_options(monkeypatch: pytest.MonkeyP
     assert set(options) < set(given)
 
 
-def test_a_missing_interface_package_is_reported_before_the_start(
-    tmp_path: Path,
+GRIP = "{type: arm_interfaces/msg/Grip, qos: command, external: true}"
+USED = f"{{subscriptions: {{grip: {GRIP}}}}}"
+#: A module that a class imports in vain, none for a message of a port, and the hint.
+MISSING = (
+    ("", "colcon build --packages-select arm_interfaces"),
+    ("interactive_markers", "pip install interactive_markers   or, if it is a package of ROS: apt"),
+    ("can", "pip install python-can\n"),
+    ("geographic_msgs.msg", "compose interface build geographic_msgs   or: apt install ros-"),
+    ("arm_interfaces.msg", "compose interface build arm_interfaces   or: colcon build"),
+)
+
+
+def test_missing_packages_are_reported_before_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "interfaces" / "arm_interfaces"
     (package / "msg").mkdir(parents=True)
     (package / "package.xml").write_text("<package><name>arm_interfaces</name></package>")
     (package / "msg" / "Grip.msg").write_text("float64 force\n")
     (tmp_path / "composer.yaml").write_text("interfaces: [interfaces]\n")
-    system = tmp_path / "arm.yaml"
-    port = "{type: arm_interfaces/msg/Grip, qos: command, external: true}"
-    system.write_text(f"system: arm\nnodes:\n  arm: {{subscriptions: {{grip: {port}}}}}\n")
-    done = compose("run", system)
-    assert done.returncode == 78
-    assert "'arm_interfaces' of node 'arm' is not installed for this Python\n" in done.stderr
-    assert "  colcon build --packages-select arm_interfaces" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("module", "hint"),
-    [
-        (
-            "interactive_markers",
-            "pip install interactive_markers   or, if it is a package of ROS: apt",
-        ),
-        ("can", "pip install python-can\n"),
-        ("geographic_msgs.msg", "compose interface build geographic_msgs   or: apt install ros-"),
-        ("arm_interfaces.msg", "compose interface build arm_interfaces   or: colcon build"),
-    ],
-)
-def test_a_module_that_a_class_imports_in_vain_is_reported_before_the_start(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, hint: str
-) -> None:
-    definition = tmp_path / "interfaces" / "arm_interfaces" / "msg" / "Grip.msg"
-    definition.parent.mkdir(parents=True)
-    definition.write_text("float64 force\n")
-    (definition.parents[1] / "package.xml").write_text(
-        "<package><name>arm_interfaces</name></package>"
-    )
     (tmp_path / "arm_interfaces").mkdir()  # as in the source of a package with code as well
     (tmp_path / "arm_interfaces" / "__init__.py").touch()
-    monkeypatch.chdir(tmp_path)
-    tmp_path.joinpath("marker.py").write_text(
-        f"import {module}\nfrom rclpy.node import Node\nclass Marker(Node): ...\n"
-    )
-    system = tmp_path / "marker.yaml"
-    system.write_text('system: marker\nnodes: {marker: {class: "marker:Marker"}}\n')
-    done = compose("run", system)
-    assert done.returncode == 78
-    package = module.partition(".")[0]
-    assert f"'marker:Marker' of node 'marker' imports '{package}" in done.stderr
-    assert "', which is not installed for this Python\n" in done.stderr
-    assert f"\n  {hint}" in done.stderr
-    assert "Traceback" not in done.stderr
+    for number, (module, hint) in enumerate(MISSING):
+        (tmp_path / f"marker_{number}.py").write_text(
+            f"import {module or 'sys'}\nfrom rclpy.node import Node\nclass Marker(Node): ...\n"
+        )
+        node = f'{{class: "marker_{number}:Marker"}}' if module else USED
+        (tmp_path / "arm.yaml").write_text(f"system: arm\nnodes: {{arm: {node}}}\n")
+        if module:  # sources are searched for in the current folder
+            monkeypatch.chdir(tmp_path)
+        done = compose("run", tmp_path / "arm.yaml")
+        assert done.returncode == 78
+        user = f"'marker_{number}:Marker' of node 'arm' imports '{module.partition('.')[0]}"
+        user = user if module else "'arm_interfaces' of node 'arm' is not"
+        assert user in done.stderr
+        assert "is not installed for this Python\n" in done.stderr
+        assert f"\n  {hint}" in done.stderr
+        assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("command", "kind"),
-    [("node list", "node"), ("topic list", "topic"), ("lifecycle nodes", "lifecycle node")],
-)
-def test_an_empty_list_is_explained(command: str, kind: str) -> None:
-    done = compose(*command.split())
-    assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr.startswith(f"no {kind} found: ")
-
-
-def test_an_empty_graph_is_reported_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_graph_is_explained_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    for command, kind in (
+        ("node list", "node"),
+        ("topic list", "topic"),
+        ("lifecycle nodes", "lifecycle node"),
+    ):
+        done = compose(*command.split())
+        assert (done.returncode, done.stdout) == (0, "")
+        assert done.stderr.startswith(f"no {kind} found: ")
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     done = compose("lifecycle", "get", "planner", "--timeout", "1")
     assert done.returncode == 1
@@ -271,3 +251,63 @@ def test_ctrl_c_ends_a_run_that_is_still_loading_ros() -> None:
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, error) == (-signal.SIGINT, "")
+
+
+LOUD = """
+system: loud
+nodes:
+  loud:
+    behavior: loud:Loud
+    publishers: {beat: {type: std_msgs/msg/Int64, external: true}}
+    timers: {tick: {period_ms: 5}}
+"""
+MODULE = """
+import sys
+import rclpy.logging
+from composer.behavior import Behavior
+from std_msgs.msg import Int64
+
+class Loud(Behavior):
+    beats = 0
+
+    def on_tick(self):
+        self.beats += 1
+        self.log.info("x" * 10_000)
+        print("y" * 10_000)
+        print("z" * 10_000, file=sys.stderr)
+        rclpy.logging.get_logger("rcl").error("c" * 100)
+        self.publishers.beat.publish(Int64(data=self.beats))
+"""
+
+
+@pytest.fixture
+def loud(tmp_path: Path) -> Path:
+    path = tmp_path / "loud.yaml"
+    path.write_text(dedent(LOUD), encoding="utf-8")
+    path.with_suffix(".py").write_text(dedent(MODULE), encoding="utf-8")
+    return path
+
+
+def test_a_system_whose_output_nothing_reads_runs_and_ends_in_time(loud: Path, peer: Peer) -> None:
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    process = subprocess.Popen([*COMPOSE, "run", str(loud)], stdout=writing, stderr=writing)
+    os.close(writing)
+    try:
+        beats = peer.listen(Int64, "/beat")
+        wait_until(lambda: beats and beats[-1].data > 50, "beats while the output is blocked")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) == 0, "with the time limit of the shutdown, it is 1"
+    finally:
+        process.kill()
+        process.wait()
+        os.close(reading)
+
+
+def test_a_closed_stderr_does_not_change_the_exit_code(loud: Path) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [*COMPOSE, "run", str(loud), "--for", "0.1"]
+    done = subprocess.run(command, stdout=writing, stderr=writing, check=False, timeout=PATIENCE_S)
+    os.close(writing)
+    assert done.returncode == 0

@@ -92,13 +92,6 @@ def callback_in(text: str) -> dict[str, Any]:
     return found
 
 
-def test_top_once_does_not_use_the_full_screen(robot: Robot) -> None:
-    for options in ((), ("--json",)):
-        shown = on_a_terminal("top", "--once", *options)
-        assert "/fleet/planner" in shown
-        assert "\x1b" not in shown
-
-
 def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     assert robot.text.startswith("2 of 3 nodes active after")
     text = listed(("/fleet/camera",), "ps")
@@ -133,6 +126,10 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     assert callback["calls_hz"] == pytest.approx(20.0, abs=5.0)
     assert 0.0 < callback["busy"] < 1.0
     assert callback["count"] > tick["count"]
+    for options in ((), ("--json",)):
+        shown = on_a_terminal("top", "--once", *options)
+        assert "/fleet/planner" in shown
+        assert "\x1b" not in shown  # it does not use the full screen
     assert robot.began_s <= planner["since_s"] <= time.time()
 
     refusal = refused("run", robot.path)
@@ -155,41 +152,30 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
 
 
 def test_commands_to_a_whole_system(robot: Robot) -> None:
+    def sent(verb: str, system: object) -> str:
+        return repeated_until(bool, "lifecycle", verb, system)
+
+    none, two = (f"/fleet/robot: {count} of 3 nodes active\n" for count in (0, 2))
     assert refused("lifecycle", "pause", "zebra").endswith("\n  available: /fleet/robot\n")
-    assert (
-        repeated_until(bool, "lifecycle", "pause", "robot") == "/fleet/robot: 0 of 3 nodes active\n"
-    )
+    assert sent("pause", "robot") == none
     assert robot.states() == dict.fromkeys(robot.states(), "inactive")
-    assert (
-        repeated_until(bool, "lifecycle", "resume", "/fleet/robot")
-        == "/fleet/robot: 2 of 3 nodes active\n"
-    )
-    assert (
-        repeated_until(bool, "lifecycle", "reset", robot.path)
-        == "/fleet/robot: 0 of 3 nodes active\n"
-    )
+    assert sent("resume", "/fleet/robot") == two
+    assert sent("reset", robot.path) == none
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
 
     set_fault("configure")
+    failed = "compose: /fleet/robot did not come up: /fleet/planner"
+    cause = "configure failed: ValueError: no map"
     refusal = refused("lifecycle", "startup", "robot", "--all-or-nothing")
-    assert refusal.startswith(
-        "compose: /fleet/robot did not come up: /fleet/planner: configure failed: "
-        "ValueError: no map; rolled back"
-    )
+    assert refusal.startswith(f"{failed}: {cause}; rolled back")
     assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
     assert refused("lifecycle", "startup", "robot").startswith(
-        "compose: /fleet/robot did not come up: /fleet/planner failed; 0 of 3 nodes active, "
-        "/fleet/planner is isolated: configure failed: ValueError: no map\n"
+        f"{failed} failed; 0 of 3 nodes active, /fleet/planner is isolated: {cause}\n"
     )
     set_fault("none")
-    assert (
-        repeated_until(bool, "lifecycle", "startup", "robot")
-        == "/fleet/robot: 2 of 3 nodes active\n"
-    )
-    assert (
-        refused("lifecycle", "startup", "rowbot").splitlines()[1]
-        == "  did you mean '/fleet/robot'?"
-    )
+    assert sent("startup", "robot") == two
+    hint = refused("lifecycle", "startup", "rowbot").splitlines()[1]
+    assert hint == "  did you mean '/fleet/robot'?"
 
 
 def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> None:
@@ -224,28 +210,7 @@ def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> Non
     assert "no line of" not in output_of("logs", "-n", 3, "motor", "--since", "10m")
 
 
-def test_lifecycle_set_with_several_nodes_and_patterns(robot: Robot) -> None:
-    text = moved("motor", "planner", "deactivate")
-    assert text == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
-    text = moved("/fleet/[mp]*", "--to", "active")
-    assert text == "/fleet/motor: inactive -> active\n/fleet/planner: inactive -> active\n"
-    moved("/fleet/[mp]*", "--to", "inactive")
-    done = lifecycle_set("camera", "planner", "cleanup")
-    assert done.returncode == 0
-    done = lifecycle_set("camera", "motor", "cleanup")
-    assert (done.returncode, done.stdout) == (1, "/fleet/motor: inactive -> unconfigured\n")
-    assert "'cleanup' is not possible: /fleet/camera is unconfigured" in done.stderr
-    assert "available transitions: configure, shutdown" in done.stderr
-    unknown = "there is no lifecycle node matching 'x*'"
-    expect_error(unknown, "lifecycle", "set", "x*", "cleanup")
-    moved("camera", "--to", "finalized")
-    final = "'active' cannot be reached: /fleet/camera is finalized"
-    expect_error(final, "lifecycle", "set", "camera", "--to", "active")
-    for arguments in (["motor"], ["--to", "active"]):
-        assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
-
-
-def test_lifecycle_set_names_the_dependents_and_moves_them_on_request(robot: Robot) -> None:
+def test_lifecycle_set_with_dependents_several_nodes_and_patterns(robot: Robot) -> None:
     done = lifecycle_set("planner", "deactivate")
     assert (done.returncode, done.stdout) == (0, "/fleet/planner: active -> inactive\n")
     assert done.stderr == (
@@ -264,6 +229,25 @@ def test_lifecycle_set_names_the_dependents_and_moves_them_on_request(robot: Rob
         "/fleet/planner: unconfigured -> active",
         "/fleet/motor: inactive -> active",
     ]
+
+    text = moved("motor", "planner", "deactivate")
+    assert text == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
+    text = moved("/fleet/[mp]*", "--to", "active")
+    assert text == "/fleet/motor: inactive -> active\n/fleet/planner: inactive -> active\n"
+    moved("/fleet/[mp]*", "--to", "inactive")
+    done = lifecycle_set("camera", "planner", "cleanup")
+    assert done.returncode == 0
+    done = lifecycle_set("camera", "motor", "cleanup")
+    assert (done.returncode, done.stdout) == (1, "/fleet/motor: inactive -> unconfigured\n")
+    assert "'cleanup' is not possible: /fleet/camera is unconfigured" in done.stderr
+    assert "available transitions: configure, shutdown" in done.stderr
+    unknown = "there is no lifecycle node matching 'x*'"
+    expect_error(unknown, "lifecycle", "set", "x*", "cleanup")
+    moved("camera", "--to", "finalized")
+    final = "'active' cannot be reached: /fleet/camera is finalized"
+    expect_error(final, "lifecycle", "set", "camera", "--to", "active")
+    for arguments in (["motor"], ["--to", "active"]):
+        assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
 
 
 def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> None:
@@ -286,8 +270,18 @@ def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> No
         robot.kill(signal.SIGCONT)
 
 
-def test_a_killed_system_is_not_running(robot: Robot) -> None:
-    robot.kill()
+def test_a_killed_system_is_not_running_and_no_command_waits_for_it(robot: Robot) -> None:
+    set_fault("hang")
+    repeated_until(bool, "lifecycle", "pause", "robot")
+    # By itself, it would wait longer than this test may take.
+    with start("lifecycle", "resume", "robot", "--timeout", "600") as resuming:
+        assert resuming.stderr is not None
+        wait_until(lambda: robot.states()["/fleet/planner"] == "activating", "it hangs")
+        robot.kill()
+        refusal = resuming.stderr.read()
+    assert resuming.returncode == 1
+    assert "/fleet/robot did not resume: its process has ended" in refusal
+
     wait_until(lambda: not local_systems(), "its end")
     assert output_of("ps") == "no system is running\n"
     assert output_of("lifecycle", "nodes") == ""
@@ -304,19 +298,6 @@ def test_a_killed_system_is_not_running(robot: Robot) -> None:
     assert "did you mean" in misspelled
     for text in (by_name, get):
         assert "there is no lifecycle node " in text
-
-
-def test_a_command_does_not_wait_for_an_ended_process(robot: Robot) -> None:
-    set_fault("hang")
-    repeated_until(bool, "lifecycle", "pause", "robot")
-    # By itself, it would wait longer than this test may take.
-    with start("lifecycle", "resume", "robot", "--timeout", "600") as resuming:
-        assert resuming.stderr is not None
-        wait_until(lambda: robot.states()["/fleet/planner"] == "activating", "it hangs")
-        robot.kill()
-        refusal = resuming.stderr.read()
-    assert resuming.returncode == 1
-    assert "/fleet/robot did not resume: its process has ended" in refusal
 
 
 def test_a_failed_bring_up_ends_the_background_process(path: Path) -> None:
