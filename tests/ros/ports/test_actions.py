@@ -12,6 +12,7 @@ from composer_interfaces.action import Navigate
 from rclpy.qos import qos_profile_action_status_default
 
 from composer.runtime.executors import actions
+from composer.runtime.supervision.events import Logged
 from tests.ros.support.in_process import Peer, finished, running, wait_until
 
 SERVER = """
@@ -67,7 +68,7 @@ class Navigator:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_declared_action_gives_feedback_and_a_result(
+def test_a_declared_action_gives_feedback_and_results_and_rejects_goals(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     with running(SERVER.replace("KIND", kind), tmp_path) as system:
@@ -82,16 +83,6 @@ def test_a_declared_action_gives_feedback_and_a_result(
         wait_until(lambda: len(navigator.feedback) == 4, "all feedback")
         status, result = navigator.result(handle)
         assert system.log() == ["goal to 3.0"]
-    assert status == GoalStatus.STATUS_SUCCEEDED
-    assert (result.success, result.message) == (True, "arrived at 3.0")
-    assert navigator.feedback == [25.0, 50.0, 75.0, 100.0]
-
-
-def test_goals_are_rejected_by_accept_and_by_a_node_that_is_not_active(
-    tmp_path: Path, peer: Peer
-) -> None:
-    with running(SERVER.replace("KIND", "events"), tmp_path) as system:
-        navigator = Navigator(peer)
         assert not navigator.send(max_velocity=0.0).accepted
         system.wait_for_log("rejects a goal: it does not fulfill 'accept'")
         assert peer.change("/server", "deactivate")
@@ -99,6 +90,9 @@ def test_goals_are_rejected_by_accept_and_by_a_node_that_is_not_active(
         system.wait_for_log("rejects a goal: /server is inactive, not active")
         assert peer.change("/server", "activate")
         assert navigator.send().accepted
+    assert status == GoalStatus.STATUS_SUCCEEDED
+    assert (result.success, result.message) == (True, "arrived at 3.0")
+    assert navigator.feedback[:4] == [25.0, 50.0, 75.0, 100.0]
 
 
 HANDLED = """
@@ -133,16 +127,30 @@ def handled(kind: str = "events", reentrant: bool = False) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_client_cancels_a_goal(tmp_path: Path, peer: Peer, kind: str) -> None:
+def test_goals_run_one_at_a_time_and_end_when_canceled_or_deactivated(
+    tmp_path: Path, peer: Peer, kind: str
+) -> None:
+    canceled = GoalStatus.STATUS_CANCELED
     with running(handled(kind), tmp_path, handled=PATIENT) as system:
         navigator = Navigator(peer)
         assert not navigator.send(100.0).accepted
-        handle = navigator.send(2.0)
-        system.wait_for_log("begin 2.0")
-        answer = navigator.cancel(handle)
-        status, result = navigator.result(handle)
-    assert len(answer.goals_canceling) == 1
-    assert (status, result.message) == (GoalStatus.STATUS_CANCELED, "stopped")
+        first, second, third = (navigator.send(float(number)) for number in (1, 2, 3))
+        system.wait_for_log("begin 1.0")
+        navigator.cancel(second)  # which waits
+        assert navigator.result(second)[0] == canceled
+        assert "begin 3.0" not in system.log_text()
+        assert len(navigator.cancel(first).goals_canceling) == 1
+        status, result = navigator.result(first)
+        assert (status, result.message) == (canceled, "stopped")
+        system.wait_for_log("begin 3.0")
+        waiting = navigator.send(4.0)
+        assert peer.change("/handled", "deactivate")
+        assert peer.state("/handled") == "inactive"
+        assert [navigator.result(goal)[0] for goal in (third, waiting)] == [canceled] * 2
+        counted = system.summary("/handled")
+    assert "begin 2.0" not in system.log_text()
+    assert counted.errors == 0
+    assert system.end().exit_code == 0
 
 
 INSTANT = """
@@ -175,24 +183,6 @@ def test_few_ended_goals_are_kept(
     assert {status for status, _ in outcomes[:4]} == {GoalStatus.STATUS_UNKNOWN}
 
 
-def test_one_goal_runs_at_a_time_and_waiting_ones_can_be_canceled(
-    tmp_path: Path, peer: Peer
-) -> None:
-    with running(handled(), tmp_path, handled=PATIENT) as system:
-        navigator = Navigator(peer)
-        first, second, third = (navigator.send(float(number)) for number in (1, 2, 3))
-        system.wait_for_log("begin 1.0")
-        navigator.cancel(second)
-        assert navigator.result(second)[0] == GoalStatus.STATUS_CANCELED
-        assert "begin 3.0" not in system.log_text()
-        navigator.cancel(first)
-        assert navigator.result(first)[0] == GoalStatus.STATUS_CANCELED
-        system.wait_for_log("begin 3.0")
-        navigator.cancel(third)
-        assert navigator.result(third)[0] == GoalStatus.STATUS_CANCELED
-    assert "begin 2.0" not in system.log_text()
-
-
 def test_goals_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
     with running(handled(reentrant=True), tmp_path, handled=PATIENT) as system:
         navigator = Navigator(peer)
@@ -200,21 +190,6 @@ def test_goals_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
         assert navigator.send(2.0).accepted
         system.wait_for_log("begin 1.0")
         system.wait_for_log("begin 2.0")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_deactivation_cancels_the_goals(tmp_path: Path, peer: Peer, kind: str) -> None:
-    with running(handled(kind), tmp_path, handled=PATIENT) as system:
-        navigator = Navigator(peer)
-        running_goal, waiting = navigator.send(1.0), navigator.send(2.0)
-        system.wait_for_log("begin 1.0")
-        assert peer.change("/handled", "deactivate")
-        assert peer.state("/handled") == "inactive"
-        assert navigator.result(running_goal)[0] == GoalStatus.STATUS_CANCELED
-        assert navigator.result(waiting)[0] == GoalStatus.STATUS_CANCELED
-        counted = system.summary("/handled")
-    assert counted.errors == 0
-    assert system.end().exit_code == 0
 
 
 def test_a_handler_that_does_not_end_its_goal_is_canceled(tmp_path: Path, peer: Peer) -> None:
@@ -283,7 +258,9 @@ nodes:
     behavior: handled:Handled
     action_servers:
       navigate: {type: composer_interfaces/action/Navigate, external: true}
-  client:
+"""
+CLIENT_NODE = """
+  client_NUMBER:
     lifecycle: {depends_on: [server]}
     action_clients:
       navigate:
@@ -295,44 +272,50 @@ nodes:
     timers:
       send: {period_ms: 20, when: count == 0, call: {navigate: {target: {x: TARGET}}}}
 """
+REACTING = """
+from composer.behavior import Behavior
+from composer_interfaces.action import Navigate
+
+class Handled(Behavior):
+    def accept_navigate(self, request):
+        return request.target.x < 100.0
+
+    async def on_navigate(self, goal):
+        goal.publish_feedback(Navigate.Feedback(progress_percent=50.0))
+        await self.clock.sleep(0.05)
+        if goal.request.target.x < 0.0:
+            goal.abort()
+            return Navigate.Result()
+        return Navigate.Result(message="done")
+"""
+#: The logs of clients by their targets.
+REACTIONS = {
+    "1.0": ["feedback 50.0 of 1.0", "succeeded: done"],
+    "-1.0": ["feedback 50.0 of -1.0", "aborted: "],
+    "100.0": ["failed: action '/navigate' rejected the goal"],
+}
 
 
-@pytest.mark.parametrize(
-    ("target", "lines"),
-    [
-        ("1.0", ["feedback 50.0 of 1.0", "succeeded: done"]),
-        ("-1.0", ["feedback 50.0 of -1.0", "aborted: "]),
-        ("100.0", ["failed: action '/navigate' rejected the goal"]),
-    ],
-)
-def test_the_reactions_of_an_action_client(
-    tmp_path: Path, peer: Peer, target: str, lines: list[str]
-) -> None:
-    module = """
-    from composer.behavior import Behavior
-    from composer_interfaces.action import Navigate
+def with_clients(*targets: str) -> str:
+    return CLIENT + "".join(
+        CLIENT_NODE.replace("NUMBER", str(number)).replace("TARGET", target)
+        for number, target in enumerate(targets)
+    )
 
-    class Handled(Behavior):
-        def accept_navigate(self, request):
-            return request.target.x < 100.0
 
-        async def on_navigate(self, goal):
-            goal.publish_feedback(Navigate.Feedback(progress_percent=50.0))
-            await self.clock.sleep(0.05)
-            if goal.request.target.x < 0.0:
-                goal.abort()
-                return Navigate.Result()
-            return Navigate.Result(message="done")
-    """
-    with running(CLIENT.replace("TARGET", target), tmp_path, handled=module) as system:
-        system.wait_for_log(lines[-1])
-    assert [line for line in system.log() if "rejects" not in line] == lines
+def test_the_reactions_of_an_action_client(tmp_path: Path) -> None:
+    with running(with_clients(*REACTIONS), tmp_path, handled=REACTING) as system:
+        for lines in REACTIONS.values():
+            system.wait_for_log(lines[-1])
+    for number, lines in enumerate(REACTIONS.values()):
+        logged = system.reported(Logged)
+        assert [item.message for item in logged if item.logger == f"client_{number}"] == lines
 
 
 def test_goals_are_canceled_when_their_client_leaves_active(tmp_path: Path, peer: Peer) -> None:
-    with running(CLIENT.replace("TARGET", "1.0"), tmp_path, handled=PATIENT) as system:
+    with running(with_clients("1.0"), tmp_path, handled=PATIENT) as system:
         system.wait_for_log("begin 1.0")
-        assert peer.change("/client", "deactivate")
+        assert peer.change("/client_0", "deactivate")
         system.wait_for_log("end 1.0")
         assert peer.state("/server") == "active"
-        assert system.summary("/client").errors == 0
+        assert system.summary("/client_0").errors == 0

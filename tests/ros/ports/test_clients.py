@@ -24,11 +24,18 @@ nodes:
     timers:
       ask: {period_ms: 50, when: count == 0, call: {trigger: {}}}
 """
-ON_FAILURE = '        on_failure: {log: {level: warn, message: "failed: {failure}"}}\n'
-
-
-def declared(on_failure: bool) -> str:
-    return ASKER.replace("    timers:", (ON_FAILURE if on_failure else "") + "    timers:")
+ON_FAILURE = """
+        on_failure: {log: {level: warn, message: "failed: {failure}"}}
+    timers:"""
+#: One client reacts to failures, the other does not.
+UNSERVED = (
+    ASKER.replace("    timers:", ON_FAILURE.lstrip("\n"))
+    + """
+  plain:
+    clients: {trigger: {type: std_srvs/srv/Trigger, external: true, timeout_ms: 200}}
+    timers: {ask: {period_ms: 50, when: count == 0, call: {trigger: {}}}}
+"""
+)
 
 
 def activate_once_the_server_is_known(system: RunningSystem) -> None:
@@ -48,32 +55,23 @@ def test_a_declared_call_is_answered(tmp_path: Path, peer: Peer) -> None:
         assert system.summary("/asker").calls == 1
 
 
-def test_a_missing_server_is_a_failure(tmp_path: Path) -> None:
-    with running(declared(on_failure=True), tmp_path) as system:
-        line = system.wait_for_log("failed")
-    assert line == "failed: no server of service '/trigger' was available within 200 ms"
-
-
-def test_a_failure_without_a_reaction_is_logged_and_counted(tmp_path: Path) -> None:
-    with running(ASKER, tmp_path) as system:
-        line = system.wait_for_log("within 200 ms")
-        counted = system.summary("/asker")
-    assert line == "client 'trigger': no server of service '/trigger' was available within 200 ms"
-    assert counted.errors == 1
-
-
-def test_a_missing_response_is_a_failure(tmp_path: Path, peer: Peer) -> None:
+def test_missing_servers_and_responses_are_failures(tmp_path: Path, peer: Peer) -> None:
+    """Without a reaction, a failure is logged and counted."""
+    no_server = "no server of service '/trigger' was available within 200 ms"
     held = threading.Event()
 
     def answer_late(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         held.wait(20.0)
         return response
 
-    peer.node.create_service(Trigger, "/trigger", answer_late)
-    text = declared(on_failure=True)
-    with running(text, tmp_path, autostart=PrimaryState.INACTIVE) as system:
-        activate_once_the_server_is_known(system)
-        line = system.wait_for_log("failed")
+    with running(UNSERVED, tmp_path) as system:
+        assert system.wait_for_log("failed") == f"failed: {no_server}"
+        assert system.wait_for_log("client 'trigger'") == f"client 'trigger': {no_server}"
+        assert system.node("plain").statistics.errors == 1
+        peer.node.create_service(Trigger, "/trigger", answer_late)
+        system.change("asker", "deactivate", "cleanup", "configure")
+        activate_once_the_server_is_known(system)  # it asks again
+        line = system.wait_for_log("did not answer")
         held.set()
     assert line == "failed: service '/trigger' did not answer within 200 ms"
 

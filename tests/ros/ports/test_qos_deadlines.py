@@ -125,21 +125,26 @@ def test_a_kept_deadline_is_not_reported(tmp_path: Path) -> None:
         assert counts(system, "talker") == counts(system, "listener") == {}
 
 
-LISTENER = """
+OUTSIDE = """
 system: outside
 qos_profiles:
   beat: {extends: command, deadline_ms: 200}
+  alive: {extends: command, liveliness: manual_by_topic, liveliness_lease_duration_ms: 300}
 nodes:
   listener:
     subscriptions:
       beat: {type: std_msgs/msg/String, qos: beat, external: true, log: "got a message"}
+  talker:
+    publishers: {alive: {type: std_msgs/msg/String, qos: alive, external: true}}
+    subscriptions:
+      go: {type: std_msgs/msg/String, external: true, publish: {alive: {data: x}}}
 """
 
 
-def test_a_deadline_missed_by_an_external_node_is_logged_with_its_name(
+def test_external_nodes_are_named_and_a_publisher_without_liveliness_is_logged(
     tmp_path: Path, peer: Peer
 ) -> None:
-    with running(LISTENER, tmp_path) as system:
+    with running(OUTSIDE, tmp_path) as system:
         qos = QoSProfile(depth=10, deadline=Duration(nanoseconds=200_000_000))
         publisher = peer.publisher(String, "/beat", qos)
         node = system.ros_node("listener")
@@ -148,22 +153,6 @@ def test_a_deadline_missed_by_an_external_node_is_logged_with_its_name(
         system.wait_for_log("got a message")
         name = peer.node.get_fully_qualified_name()
         assert name in system.wait_for_log(OF_SUBSCRIPTION)
-
-
-MANUAL = """
-system: manual
-qos_profiles:
-  alive: {extends: command, liveliness: manual_by_topic, liveliness_lease_duration_ms: 300}
-nodes:
-  talker:
-    publishers: {alive: {type: std_msgs/msg/String, qos: alive, external: true}}
-    subscriptions:
-      go: {type: std_msgs/msg/String, external: true, publish: {alive: {data: x}}}
-"""
-
-
-def test_a_publisher_without_liveliness_is_logged(tmp_path: Path, peer: Peer) -> None:
-    with running(MANUAL, tmp_path) as system:
         peer.publisher(String, "/go").publish(String())
         assert system.wait_for_log("did not assert its liveliness") == (
             "publisher 'alive' on /alive: "

@@ -33,6 +33,16 @@ def lines(system: RunningSystem, part: str) -> list[str]:
     return [line for line in system.log() if part in line]
 
 
+def qos_events_of(arrays: list[DiagnosticArray]) -> list[str]:
+    return [
+        value.value
+        for message in tuple(arrays)
+        for status in message.status
+        for value in status.values
+        if value.key == "qos_events"
+    ]
+
+
 ENDS = """
 system: ends
 executors: {{default: {{kind: {kind}}}}}
@@ -44,10 +54,11 @@ nodes:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_external_nodes_with_incompatible_qos_are_named_with_the_policy(
+def test_incompatible_external_nodes_are_named_with_the_policy_and_counted(
     tmp_path: Path, peer: Peer, kind: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with running(ENDS.format(kind=kind), tmp_path) as system:
+        arrays = peer.listen(DiagnosticArray, "/diagnostics")
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         known = system.ros_node("a").get_node_names
         wait_until(lambda: peer.node.get_name() in known(), "the peer's name")
@@ -66,6 +77,10 @@ def test_external_nodes_with_incompatible_qos_are_named_with_the_policy(
             "the publisher does not keep messages for late joiners"
         )
         assert counts(system, "a") == {"incompatible": 2}
+        wait_until(lambda: "incompatible=2" in qos_events_of(arrays))
+        listed = output_of("ps", "ends", "--json", "--timeout", "20")
+    nodes = json.loads(listed)["systems"][0]["nodes"]
+    assert [node["qos_events"] for node in nodes] == [{"incompatible": 2}]
     of_rclpy = capfd.readouterr().err
     assert not re.search(r"'/input', offering incompatible|\[a\].*incompatible QoS", of_rclpy)
 
@@ -129,24 +144,3 @@ def test_a_lifespan_applies_within_the_process(
         assert [*dict.fromkeys(lines(system, "received"))] == (
             received or ["received old", "received new"]
         )
-
-
-def test_ps_shows_the_counts(tmp_path: Path, peer: Peer) -> None:
-    with running(ENDS.format(kind="events"), tmp_path) as system:
-        arrays = peer.listen(DiagnosticArray, "/diagnostics")
-        peer.node.create_publisher(String, "/input", BEST_EFFORT)
-        system.wait_for_log("subscription 'input'")
-        wait_until(lambda: "incompatible=1" in qos_events_of(arrays))
-        listed = output_of("ps", "ends", "--json", "--timeout", "20")
-    nodes = json.loads(listed)["systems"][0]["nodes"]
-    assert [node["qos_events"] for node in nodes] == [{"incompatible": 1}]
-
-
-def qos_events_of(arrays: list[DiagnosticArray]) -> list[str]:
-    return [
-        value.value
-        for message in tuple(arrays)
-        for status in message.status
-        for value in status.values
-        if value.key == "qos_events"
-    ]

@@ -111,12 +111,17 @@ nodes:
 """
 
 
-def test_constant_events_do_not_deadlock(tmp_path: Path) -> None:
+def test_constant_events_are_watched_from_the_start_and_do_not_deadlock(tmp_path: Path) -> None:
     with (
         hand_written("hand_written_flood.py", "10", "100"),
         hand_written("hand_written_flood.py", "10", "100"),
         running(RESTLESS, tmp_path) as system,
     ):
+        # Starting to watch takes a status, too. rclpy's handlers were watched once their node's
+        # loop had found them, when messages could be lost: one in hundreds of runs deadlocked.
+        subscriptions = list(system.ros_node("listener").subscriptions)
+        assert [ends.topic_name for ends in subscriptions] == ["/big", "/alive"]
+        assert [ends.event_handlers for ends in subscriptions] == [[], []]
         wait_until(lambda: counts(system).get("liveliness_changed", 0) > 100)
         ticks = system.log().count("tick")
         wait_until(lambda: system.log().count("tick") > ticks + 20)
@@ -124,15 +129,6 @@ def test_constant_events_do_not_deadlock(tmp_path: Path) -> None:
         system.change("listener", "deactivate", "cleanup", "configure", "activate")
         before = counts(system)["liveliness_changed"]
         wait_until(lambda: counts(system)["liveliness_changed"] > before + 20)
-
-
-def test_events_are_watched_from_the_start(tmp_path: Path) -> None:
-    # Starting to watch takes a status, too. rclpy's handlers were watched once their node's loop
-    # had found them, when messages could be lost already: one in hundreds of runs deadlocked.
-    with running(RESTLESS, tmp_path) as system:
-        subscriptions = list(system.ros_node("listener").subscriptions)
-        assert [ends.topic_name for ends in subscriptions] == ["/big", "/alive"]
-        assert [ends.event_handlers for ends in subscriptions] == [[], []]
 
 
 def test_constantly_taken_statuses_do_not_deadlock(peer: Peer) -> None:

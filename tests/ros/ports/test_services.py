@@ -24,70 +24,63 @@ nodes:
 """
 
 
-def test_a_declared_response_is_sent_or_the_default_one_if_when_is_false(
-    tmp_path: Path, peer: Peer
-) -> None:
-    with running(STUB, tmp_path) as system:
-        answers = [peer.call(Trigger, "/trigger") for _ in range(3)]
-        assert system.log() == ["request 0", "request 1"]
-    assert [(answer.success, answer.message) for answer in answers] == [
-        (True, "answer 0 of /stub"),
-        (True, "answer 1 of /stub"),
-        (False, ""),
-    ]
-
-
-def test_a_node_that_is_not_active_refuses_with_a_reason(tmp_path: Path, peer: Peer) -> None:
+def test_refusals_and_declared_responses(tmp_path: Path, peer: Peer) -> None:
     with running(STUB, tmp_path) as system:
         assert peer.change("/stub", "deactivate")
         refusal = peer.call(Trigger, "/trigger")
+        assert (refusal.success, refusal.message) == (False, "/stub is inactive, not active")
         unanswered = peer.client(Empty, "/empty").call_async(Empty.Request())
         system.wait_for_log("service 'empty' refuses a request: /stub is inactive, not active")
         assert peer.change("/stub", "activate")
-        assert peer.call(Trigger, "/trigger").success
+        answers = [peer.call(Trigger, "/trigger") for _ in range(3)]
+        assert [(answer.success, answer.message) for answer in answers] == [
+            (True, "answer 0 of /stub"),
+            (True, "answer 1 of /stub"),
+            (False, ""),  # the default one: 'when' is false
+        ]
+        assert system.log()[1:] == ["request 0", "request 1"]
         assert peer.call(Empty, "/empty") == Empty.Response()
         assert not unanswered.done()  # a response would look like a result
-    assert (refusal.success, refusal.message) == (False, "/stub is inactive, not active")
 
 
-@pytest.mark.parametrize(
-    ("state", "error"),
-    [
-        ("inactive", "ServerUnavailable: service '/adder': /adder is inactive, not active"),
-        ("active", "CallError: service '/adder': on_adder: KeyError: 'two'"),
-    ],
-)
-def test_a_caller_of_the_process_gets_an_error_where_a_response_would_look_like_a_result(
-    tmp_path: Path, state: str, error: str
-) -> None:
-    text = f"""
-    system: adding
-    nodes:
-      adder:
-        behavior: adding:Adder
-        services: {{adder: {{type: rcl_interfaces/srv/GetParameters}}}}
-        lifecycle: {{autostart: {state}}}
-      caller:
-        behavior: adding:Caller
-        clients: {{adder: {{type: rcl_interfaces/srv/GetParameters}}}}
-        timers: {{tick: {{period_ms: 10}}}}
-    """
-    module = """
-    from composer.behavior import Behavior, CallError
+ADDING = """
+system: adding
+nodes:
+  away: {behavior: "adding:Adder", services: {away: {type: rcl_interfaces/srv/GetParameters}},
+         lifecycle: {autostart: inactive}}
+  adder: {behavior: "adding:Adder", services: {adder: {type: rcl_interfaces/srv/GetParameters}}}
+  caller:
+    behavior: adding:Caller
+    clients:
+      away: {type: rcl_interfaces/srv/GetParameters}
+      adder: {type: rcl_interfaces/srv/GetParameters}
+    timers: {tick: {period_ms: 10}}
+"""
+ADDING_MODULE = """
+from composer.behavior import Behavior, CallError
 
-    class Adder(Behavior):
-        def on_adder(self, request, response):
-            raise KeyError("two")
+class Adder(Behavior):
+    def on_adder(self, request, response):
+        raise KeyError("two")
 
-    class Caller(Behavior):
-        async def on_tick(self):
+    on_away = on_adder
+
+class Caller(Behavior):
+    async def on_tick(self):
+        for client in (self.clients.away, self.clients.adder):
             try:
-                await self.clients.adder.call(self.clients.adder.service_type.Request())
+                await client.call(client.service_type.Request())
             except CallError as error:
                 self.log.info(f"{type(error).__name__}: {error}")
-    """
-    with running(text, tmp_path, adding=module) as system:
-        system.wait_for_log(error)
+"""
+
+
+def test_a_caller_of_the_process_gets_an_error_where_a_response_would_look_like_a_result(
+    tmp_path: Path,
+) -> None:
+    with running(ADDING, tmp_path, adding=ADDING_MODULE) as system:
+        system.wait_for_log("ServerUnavailable: service '/away': /away is inactive, not active")
+        system.wait_for_log("CallError: service '/adder': on_adder: KeyError: 'two'")
 
 
 HANDLED = """

@@ -28,6 +28,9 @@ def test_a_timer_follows_its_parameter_and_stops_while_the_node_is_not_active(
     tmp_path: Path, peer: Peer
 ) -> None:
     with running(TIMED, tmp_path) as system:
+        for value in (0.0, -1.0, float("inf")):
+            reason = peer.set_parameter("/timed", "rate_hz", value)
+            assert reason.startswith("timer 'tick': rate_hz ")
         received = peer.listen(Int64, "/output", 1000)
         assert peer.set_parameter("/timed", "rate_hz", 100.0) == ""
         wait_until(lambda: len(received) >= 10)
@@ -40,14 +43,6 @@ def test_a_timer_follows_its_parameter_and_stops_while_the_node_is_not_active(
     assert [message.data for message in received[:10]] == list(
         range(received[0].data, received[0].data + 10)
     )
-
-
-def test_an_invalid_period_is_refused(tmp_path: Path, peer: Peer) -> None:
-    with running(TIMED, tmp_path):
-        for value in (0.0, -1.0, float("inf")):
-            reason = peer.set_parameter("/timed", "rate_hz", value)
-            assert reason.startswith("timer 'tick': rate_hz ")
-        assert peer.state("/timed") == "active"
 
 
 def test_a_call_that_is_due_while_the_previous_one_awaits_is_skipped(tmp_path: Path) -> None:
@@ -101,28 +96,6 @@ class Tuned(Behavior):
 """
 
 
-def test_parameters_are_declared_with_their_descriptors(tmp_path: Path, peer: Peer) -> None:
-    with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
-        names = ["speed", "retries", "mode", "serial"]
-        request = DescribeParameters.Request(names=names)
-        answer = peer.call(DescribeParameters, "/tuned/describe_parameters", request)
-        values = peer.call(
-            GetParameters, "/tuned/get_parameters", GetParameters.Request(names=names)
-        ).values
-    speed, retries, mode, serial = answer.descriptors
-    assert speed.description == "Speed limit. [m/s]"
-    limits = speed.floating_point_range[0]
-    assert (limits.from_value, limits.to_value, limits.step) == (0.0, 5.0, 0.5)
-    assert (retries.integer_range[0].from_value, retries.integer_range[0].to_value) == (
-        1,
-        2**63 - 1,
-    )
-    assert mode.additional_constraints == "one of: slow, fast"
-    assert serial.read_only
-    assert (values[0].double_value, values[1].integer_value) == (1.0, 3)
-    assert system.log()[0] == r"1.0 [1.0, 2.5] b'\x01\xff'"
-
-
 REFUSED = [
     ("speed", 9.0, "out of range"),
     ("speed", 0.7, "step"),
@@ -138,15 +111,17 @@ REFUSED = [
 ]
 
 
-def test_invalid_values_are_refused_with_the_reason(tmp_path: Path, peer: Peer) -> None:
+def test_parameters_are_described_refused_and_changed(tmp_path: Path, peer: Peer) -> None:
     with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
+        names = ["speed", "retries", "mode", "serial"]
+        request = DescribeParameters.Request(names=names)
+        described = peer.call(DescribeParameters, "/tuned/describe_parameters", request)
+        request = GetParameters.Request(names=names)
+        values = peer.call(GetParameters, "/tuned/get_parameters", request).values
         for name, value, reason in REFUSED:
             assert reason in peer.set_parameter("/tuned", name, value)
-    assert len(system.log()) == 1
-
-
-def test_a_change_reaches_the_behavior_and_the_expressions(tmp_path: Path, peer: Peer) -> None:
-    with running(PARAMETERS, tmp_path, tuned=TUNED) as system:
+        assert system.log() == [r"1.0 [1.0, 2.5] b'\x01\xff'"]
+        # A change reaches the behavior and the expressions.
         assert "got 'Type.INTEGER'" in peer.set_parameter("/tuned", "speed", 2)  # as in rclpy
         assert peer.set_parameter("/tuned", "speed", 2.0) == ""
         assert peer.set_parameter("/tuned", "mode", "fast") == ""
@@ -155,6 +130,15 @@ def test_a_change_reaches_the_behavior_and_the_expressions(tmp_path: Path, peer:
         peer.publisher(Int64, "/ask").publish(Int64())
         system.wait_for_log("2.5 fast")
         counted = system.summary("/tuned")
+    speed, retries, mode, serial = described.descriptors
+    assert speed.description == "Speed limit. [m/s]"
+    limits = speed.floating_point_range[0]
+    assert (limits.from_value, limits.to_value, limits.step) == (0.0, 5.0, 0.5)
+    limits = retries.integer_range[0]
+    assert (limits.from_value, limits.to_value) == (1, 2**63 - 1)
+    assert mode.additional_constraints == "one of: slow, fast"
+    assert serial.read_only
+    assert (values[0].double_value, values[1].integer_value) == (1.0, 3)
     assert system.log()[1:3] == ["{'speed': 2.0} 2.0", "{'mode': 'fast'} 2.0"]
     assert counted.errors == 1
 
