@@ -14,13 +14,13 @@ from tests.ros.support.simulator import Simulator
 CLASSES = "tests.ros.support.node_classes"
 
 
-@pytest.mark.parametrize("executor", ["events", "multi_threaded"])
-def test_goals_are_executed_while_the_node_is_active(
+@pytest.mark.parametrize("executor", ["kind: events", "kind: multi_threaded, threads: 3"])
+def test_goals_are_executed_while_the_node_is_active_and_canceled_when_it_is_not(
     tmp_path: Path, peer: Peer, executor: str
 ) -> None:
     text = f"""
     system: goals
-    executors: {{own: {{kind: {executor}, threads: 3}}}}
+    executors: {{own: {{{executor}}}}}
     nodes:
       navigator:
         class: {CLASSES}:Navigator
@@ -28,29 +28,13 @@ def test_goals_are_executed_while_the_node_is_active(
         action_servers: {{navigate: {{type: composer_interfaces/action/Navigate, action: go}}}}
         remappings: {{navigate: go}}
       sender: {{class: "{CLASSES}:Sender", remappings: {{navigate: go}}}}
-    """.replace(", threads: 3" if executor == "events" else "\0", "")
+    """
     with running(text, tmp_path) as system:
         sender = system.node("sender").instance
         wait_until(lambda: sender.statuses)
         assert sender.statuses == [GoalStatus.STATUS_SUCCEEDED]
         assert sender.feedback == 3
         client = peer.action_client(Navigate, "/go")
-        system.change("navigator", "deactivate")
-        goal = Navigate.Goal()
-        handle = finished(peer.run(lambda: client.send_goal_async(goal)))
-        assert not handle.accepted
-        client.destroy()
-
-
-def test_a_running_goal_is_canceled_when_the_node_leaves_active(tmp_path: Path, peer: Peer) -> None:
-    text = f"""
-    system: cancel
-    executors: {{pool: {{kind: multi_threaded, threads: 3}}}}
-    nodes:
-      navigator: {{class: "{CLASSES}:Navigator", executor: pool}}
-    """
-    with running(text, tmp_path) as system:
-        client = peer.action_client(Navigate, "/navigate")
         goal = Navigate.Goal()
         goal.target.x = 1000.0
         handle = finished(peer.run(lambda: client.send_goal_async(goal)))
@@ -59,6 +43,7 @@ def test_a_running_goal_is_canceled_when_the_node_leaves_active(tmp_path: Path, 
         system.change("navigator", "deactivate")
         assert finished(result).status == GoalStatus.STATUS_CANCELED
         assert system.node("navigator").instance.canceled == 1
+        assert not finished(peer.run(lambda: client.send_goal_async(goal))).accepted
         client.destroy()
 
 

@@ -23,32 +23,20 @@ from {CLASSES} import Configured
 rclpy.init()
 rclpy.spin(Configured())
 """
+RENAMED = ("__node:=robot_node", "__ns:=/fleet/one", "scan:=/all/scan", "start:=begin")
+SET = (
+    "rate:=2.5",
+    "count:=3",
+    "label:=front",
+    "enabled:=true",
+    "gains:=[1.0,2.5]",
+    'names:=["a","b"]',
+    "use_sim_time:=true",
+)
 ARGUMENTS = [
     "--ros-args",
-    "-r",
-    "__node:=robot_node",
-    "-r",
-    "__ns:=/fleet/one",
-    "-r",
-    "scan:=/all/scan",
-    "-r",
-    "start:=begin",
-    "-r",
-    "~/private:=open",
-    "-p",
-    "rate:=2.5",
-    "-p",
-    "count:=3",
-    "-p",
-    "label:=front",
-    "-p",
-    "enabled:=true",
-    "-p",
-    "gains:=[1.0,2.5]",
-    "-p",
-    'names:=["a","b"]',
-    "-p",
-    "use_sim_time:=true",
+    *(word for rule in (*RENAMED, "~/private:=open") for word in ("-r", rule)),
+    *(word for value in SET for word in ("-p", value)),
 ]
 SYSTEM = f"""
 system: one

@@ -57,26 +57,27 @@ def test_a_callback_that_waits_for_a_response_is_released_when_its_node_is_deact
     assert outcome.exit_code == 0
 
 
-def test_coroutines_await_clients(tmp_path: Path, peer: Peer) -> None:
+def test_coroutines_await_clients_and_keep_their_callback_groups(
+    tmp_path: Path, peer: Peer
+) -> None:
     text = f"""
     system: awaiting
+    executors: {{pool: {{kind: multi_threaded, threads: 3}}}}
     nodes:
       listener: {{class: "{OTHERS}:Listener"}}
       caller: {{class: "{CLASSES}:AsyncCaller"}}
-    """
-    with running(text, tmp_path):
-        response = peer.call(Trigger, "/relay")
-    assert (response.success, response.message) == (True, "0")
-
-
-def test_callback_groups_exclude_each_other_on_several_threads(tmp_path: Path, peer: Peer) -> None:
-    text = f"""
-    system: groups
-    executors: {{pool: {{kind: multi_threaded, threads: 3}}}}
-    nodes:
+      timers: {{class: "{CLASSES}:AsyncTimers"}}
       groups: {{class: "{CLASSES}:Groups", executor: pool}}
     """
     with running(text, tmp_path) as system:
+        response = peer.call(Trigger, "/relay")
+        assert (response.success, response.message) == (True, "0")
+        timers = system.node("timers").instance
+        wait_until(lambda: timers.rounds >= 6)
+        assert timers.overlaps == 0
+        system.change("timers", "deactivate", "activate")
+        wait_until(lambda: timers.rounds >= 10)
+        # Callback groups exclude each other, also on several threads.
         peer.publisher(String, "/wait").publish(String())
         peer.publisher(String, "/finish").publish(String())
         wait_until(lambda: system.node("groups").instance.together == 1)
@@ -124,18 +125,3 @@ def test_a_callback_group_of_the_class_decides_when_its_callbacks_run(
         assert set(node.group.ended) == {node.numbers, node.service}
         counted = system.summary("/throttled")
     assert counted.errors == 0
-
-
-def test_a_callback_that_awaits_keeps_its_callback_group(tmp_path: Path) -> None:
-    text = f"""
-    system: awaiting
-    nodes:
-      listener: {{class: "{OTHERS}:Listener"}}
-      timers: {{class: "{CLASSES}:AsyncTimers"}}
-    """
-    with running(text, tmp_path) as system:
-        timers = system.node("timers").instance
-        wait_until(lambda: timers.rounds >= 6)
-        assert timers.overlaps == 0
-        system.change("timers", "deactivate", "activate")
-        wait_until(lambda: timers.rounds >= 10)

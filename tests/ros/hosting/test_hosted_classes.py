@@ -31,42 +31,19 @@ nodes:
 """
 
 
-def test_messages_between_hosted_classes_stay_in_the_process(tmp_path: Path) -> None:
+def test_messages_stay_in_the_process_and_external_nodes_see_an_ordinary_node(
+    tmp_path: Path, peer: Peer
+) -> None:
+    lines: list[Any] = peer.listen(Log, "/rosout", LATCHED)
     with running(TALKER_AND_LISTENER, tmp_path) as system:
         listener = system.node("listener").instance
         wait_until(lambda: len(listener.numbers) >= 5 and len(listener.infos) >= 5)
         assert listener.numbers[:5] == [1, 2, 3, 4, 5]
         # The middleware numbers its messages: in-process messages have no number.
         assert listener.infos[:5] == [(number, None) for number in range(1, 6)]
-        counted = system.summary("/listener")
-    assert counted.errors == 0
-    assert counted.received >= 10
-    line = "publisher on /talker/words is not declared: it uses DDS (std_msgs/msg/String)"
-    assert line in system.log()
+        line = "publisher on /talker/words is not declared: it uses DDS (std_msgs/msg/String)"
+        assert line in system.log()
 
-
-def test_a_message_object_that_is_published_again_arrives_as_it_was(
-    tmp_path: Path, peer: Peer
-) -> None:
-    text = f"""
-    system: reuse
-    nodes:
-      reuser:
-        class: {CLASSES}:Reuser
-        publishers: {{numbers: {{type: std_msgs/msg/Int64}}}}
-      listener:
-        class: {CLASSES}:Listener
-        subscriptions: {{numbers: {{type: std_msgs/msg/Int64}}}}
-    """
-    with running(text, tmp_path) as system:
-        peer.publisher(String, "/go").publish(String())
-        listener = system.node("listener").instance
-        wait_until(lambda: len(listener.numbers) == 3)
-        assert listener.numbers == [1, 2, 3]
-
-
-def test_external_nodes_see_an_ordinary_node(tmp_path: Path, peer: Peer) -> None:
-    with running(TALKER_AND_LISTENER, tmp_path) as system:
         numbers = peer.listen(Int64, "/numbers")
         wait_until(lambda: len(numbers) >= 3)
         assert peer.call(Trigger, "/count").success
@@ -78,6 +55,42 @@ def test_external_nodes_see_an_ordinary_node(tmp_path: Path, peer: Peer) -> None
         words = peer.listen(String, "/talker/words")
         wait_until(lambda: words and words[-1].data == "message changed")
         assert system.node("talker").state == "active"
+
+        # The log of a class goes to the console and to /rosout.
+        assert [line for line in system.log() if line == "got 1"] == ["got 1"]
+        got = wait_until(lambda: next((line for line in lines if line.msg == "got 1"), None))
+        assert got.file.endswith("/node_classes.py")
+        assert (got.function, got.line > 0) == ("on_number", True)
+        logger = listener.get_logger()
+        logger.get_child("part").warning("from a part")
+        wait_until(lambda: any(line.name == "listener.part" for line in lines))
+        assert not logger.debug("not logged")
+        counted = system.summary("/listener")
+    assert counted.errors == 0
+    assert counted.received >= 10
+
+
+@pytest.mark.parametrize("isolation", ["", ", isolation: share"])
+def test_a_message_object_that_is_published_again_arrives_as_it_was_unless_it_is_shared(
+    tmp_path: Path, peer: Peer, isolation: str
+) -> None:
+    text = f"""
+    system: reuse
+    nodes:
+      reuser:
+        class: {CLASSES}:Reuser
+        publishers: {{numbers: {{type: std_msgs/msg/Int64{isolation}}}}}
+      listener:
+        class: {CLASSES}:Listener
+        subscriptions: {{numbers: {{type: std_msgs/msg/Int64{isolation}}}}}
+    """
+    with running(text, tmp_path) as system:
+        peer.publisher(String, "/go").publish(String())
+        listener = system.node("listener").instance
+        wait_until(lambda: len(listener.numbers) == 3)
+        assert listener.numbers[-1] == 3
+        # With 'share', it is one object, which this class does change.
+        assert (listener.numbers == [1, 2, 3]) == (isolation == "")
 
 
 def test_several_instances_have_their_own_names_and_parameters(tmp_path: Path, peer: Peer) -> None:
@@ -163,56 +176,34 @@ def test_a_constructor_may_wait_for_a_service_that_is_always_on(tmp_path: Path) 
         assert "answer 0" in system.log()
 
 
-def test_callbacks_of_qos_events_are_called(tmp_path: Path, peer: Peer) -> None:
-    text = f"""
-    system: matches
-    nodes:
-      matcher:
-        class: {CLASSES}:Matcher
-        publishers: {{numbers: {{type: std_msgs/msg/Int64}}}}
-      listener:
-        class: {CLASSES}:Listener
-        subscriptions: {{numbers: {{type: std_msgs/msg/Int64}}}}
-    """
-    with running(text, tmp_path) as system:
-        numbers = peer.listen(Int64, "/numbers")
-        matcher = system.node("matcher").instance
-        wait_until(lambda: matcher.matches and numbers)
-        wait_until(lambda: system.node("listener").instance.numbers)
-        assert matcher.matches[-1] == 3  # two of the listener, one of the peer
-
-
-def test_exceptions_are_errors_of_the_node(tmp_path: Path, peer: Peer) -> None:
-    text = f'system: faults\nnodes: {{faulty: {{class: "{CLASSES}:Faulty"}}}}'
-    with running(text, tmp_path) as system:
-        failed = peer.call(SetBool, "/fail", SetBool.Request(data=True))
-        assert (failed.success, failed.message) == (False, "on_fail: ValueError: as requested")
-        assert peer.call(SetBool, "/fail", SetBool.Request(data=False)).success
-        command = peer.publisher(String, "/command")
-        command.publish(String(data="wrong"))
-        wait_until(lambda: system.node("faulty").statistics.errors == 2)
-        system.wait_for_log("ValueError: wrong")
-        assert system.node("faulty").state == "active"
-
-
-@pytest.mark.parametrize(
-    ("command", "reason"),
-    [("exit", "it raised SystemExit"), ("shutdown", "it called rclpy.shutdown()")],
-)
-def test_a_class_that_ends_its_process_is_deactivated(
-    tmp_path: Path, peer: Peer, command: str, reason: str
+def test_exceptions_are_errors_and_a_class_that_ends_its_process_is_deactivated(
+    tmp_path: Path, peer: Peer
 ) -> None:
     text = f"""
-    system: ends
+    system: faults
     nodes:
       faulty: {{class: "{CLASSES}:Faulty"}}
       listener: {{class: "{CLASSES}:Listener"}}
     """
     with running(text, tmp_path) as system:
-        peer.publisher(String, "/command").publish(String(data=command))
-        wait_until(lambda: system.node("faulty").state == "inactive")
-        wait_until(lambda: f"the node is deactivated: {reason}" in system.log())
-        assert system.node("listener").state == "active"
+        faulty = system.node("faulty")
+        failed = peer.call(SetBool, "/fail", SetBool.Request(data=True))
+        assert (failed.success, failed.message) == (False, "on_fail: ValueError: as requested")
+        assert peer.call(SetBool, "/fail", SetBool.Request(data=False)).success
+        command = peer.publisher(String, "/command")
+        command.publish(String(data="wrong"))
+        wait_until(lambda: faulty.statistics.errors == 2)
+        system.wait_for_log("ValueError: wrong")
+        assert faulty.state == "active"
+        for word, reason in (
+            ("exit", "it raised SystemExit"),
+            ("shutdown", "it called rclpy.shutdown()"),
+        ):
+            command.publish(String(data=word))
+            wait_until(lambda: faulty.state == "inactive")
+            assert system.wait_for_log(f"the node is deactivated: {reason}")
+            assert system.node("listener").state == "active"
+            system.change("faulty", "activate")
 
 
 @pytest.mark.parametrize(
@@ -235,42 +226,6 @@ def test_a_hanging_callback_of_a_class_is_interrupted_and_its_node_restarted(
         wait_until(lambda: system.node("faulty").activations == 2)
         assert system.node("faulty").instance is not first
         assert f"{callback} took longer than 200 ms" in "\n".join(map(str, system.events))
-
-
-def test_the_log_of_a_class_goes_to_the_console_and_to_rosout(tmp_path: Path, peer: Peer) -> None:
-    lines: list[Any] = peer.listen(Log, "/rosout", LATCHED)
-    with running(TALKER_AND_LISTENER, tmp_path) as system:
-        system.wait_for_log("got 1")
-        got = wait_until(lambda: next((line for line in lines if line.msg == "got 1"), None))
-        assert got.file.endswith("/node_classes.py")
-        assert got.function == "on_number"
-        assert got.line > 0
-        logger = system.node("listener").instance.get_logger()
-        logger.get_child("part").warning("from a part")
-        wait_until(lambda: any(line.name == "listener.part" for line in lines))
-        assert not logger.debug("not logged")
-        assert [line for line in system.log() if line == "got 1"] == ["got 1"]
-
-
-def test_isolation_share_assures_that_messages_are_not_used_again(
-    tmp_path: Path, peer: Peer
-) -> None:
-    text = f"""
-    system: shared
-    nodes:
-      reuser:
-        class: {CLASSES}:Reuser
-        publishers: {{numbers: {{type: std_msgs/msg/Int64, isolation: share}}}}
-      listener:
-        class: {CLASSES}:Listener
-        subscriptions: {{numbers: {{type: std_msgs/msg/Int64, isolation: share}}}}
-    """
-    with running(text, tmp_path) as system:
-        peer.publisher(String, "/go").publish(String())
-        listener = system.node("listener").instance
-        wait_until(lambda: len(listener.numbers) == 3)
-        assert listener.numbers[-1] == 3
-        assert listener.numbers != [1, 2, 3]  # one object, which this class does change
 
 
 def test_log_levels_are_set_per_node(tmp_path: Path) -> None:

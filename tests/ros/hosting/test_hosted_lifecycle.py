@@ -87,7 +87,9 @@ def test_parameters_that_are_set_before_the_first_configuration_are_kept(
         system.wait_for_log("the word is early")
 
 
-def test_the_handlers_of_a_lifecycle_node_class_are_called(tmp_path: Path, peer: Peer) -> None:
+def test_the_handlers_of_a_lifecycle_node_class_are_called_and_may_refuse(
+    tmp_path: Path, peer: Peer
+) -> None:
     history.clear()
     text = f"""
     system: counting
@@ -95,6 +97,11 @@ def test_the_handlers_of_a_lifecycle_node_class_are_called(tmp_path: Path, peer:
       counter:
         class: {CLASSES}:Counter
         publishers: {{numbers: {{type: std_msgs/msg/Int64, external: true}}}}
+      refusing:
+        class: {CLASSES}:Counter
+        lifecycle: {{autostart: unconfigured}}
+        parameters: {{refuse: {{type: string, default: configure}}}}
+        remappings: {{numbers: others}}
     """
     with running(text, tmp_path) as system:
         assert "has not created" not in system.log_text()  # on_configure does
@@ -109,20 +116,9 @@ def test_the_handlers_of_a_lifecycle_node_class_are_called(tmp_path: Path, peer:
         assert counter.count == count
         system.change("counter", "cleanup")
         assert history == ["cleaned up"]
-
-
-def test_a_handler_can_refuse_a_transition(tmp_path: Path, peer: Peer) -> None:
-    text = f"""
-    system: refusing
-    nodes:
-      counter:
-        class: {CLASSES}:Counter
-        parameters: {{refuse: {{type: string, default: configure}}}}
-    """
-    with running(text, tmp_path, autostart=PrimaryState.UNCONFIGURED) as system:
-        wait_until(lambda: peer.node.count_services("/counter/change_state") == 1)
-        assert not peer.change("/counter", "configure")
-        assert system.node("counter").state == "unconfigured"
+        wait_until(lambda: peer.node.count_services("/refusing/change_state") == 1)
+        assert not peer.change("/refusing", "configure")
+        assert system.node("refusing").state == "unconfigured"
         system.wait_for_log("on_configure refused the transition: on_configure returned FAILURE")
 
 
@@ -158,26 +154,15 @@ def test_what_cannot_be_hosted_is_refused_with_the_reason(tmp_path: Path) -> Non
     assert "Traceback" not in log
 
 
-def test_a_declared_type_that_the_class_does_not_have_is_refused(tmp_path: Path) -> None:
+def test_what_is_declared_otherwise_than_in_the_class_is_refused_or_reported(
+    tmp_path: Path,
+) -> None:
     text = f"""
     system: wrong
     nodes:
-      talker:
+      wrong:
         class: {CLASSES}:Talker
         publishers: {{numbers: {{type: std_msgs/msg/String}}}}
-    """
-    with running(text, tmp_path) as system:
-        system.end()
-    assert (
-        "publisher 'numbers' on /numbers is declared as std_msgs/msg/String, but the class creates"
-        " std_msgs/msg/Int64; declare 'type: std_msgs/msg/Int64'"
-    ) in system.log_text()
-
-
-def test_what_is_declared_and_missing_in_the_class_is_reported(tmp_path: Path) -> None:
-    text = f"""
-    system: missing
-    nodes:
       talker:
         class: {CLASSES}:Talker
         publishers:
@@ -186,7 +171,13 @@ def test_what_is_declared_and_missing_in_the_class_is_reported(tmp_path: Path) -
         parameters: {{speed: {{type: double, default: 1}}}}
     """
     with running(text, tmp_path) as system:
+        system.wait_for_failure("/wrong")
+        assert system.node("talker").state == "active"
         log = system.log()
+    assert (
+        "publisher 'numbers' on /numbers is declared as std_msgs/msg/String, but the class creates"
+        " std_msgs/msg/Int64; declare 'type: std_msgs/msg/Int64'"
+    ) in "\n".join(log)
     assert "the class has not created publisher 'other' on /other" in log
     assert "the class has not declared parameter 'speed'" in log
     qos = "publisher 'numbers': reliability is reliable, declared as best_effort"
