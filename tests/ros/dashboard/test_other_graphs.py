@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +13,11 @@ import pytest
 from composer.runtime.process.instance_lock import local_systems
 from tests.ros.support.commands import hand_written, listed
 from tests.ros.support.dashboard import dashboard
-from tests.ros.support.pages import opened, visit
+from tests.ros.support.pages import expect_text, opened, visit
 from tests.ros.support.system_process import RunningSystem
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser
 
 pytestmark = pytest.mark.browser
 SYSTEM = """
@@ -58,44 +57,41 @@ class Source(Behavior):
 """
 
 
-def expect(page: Page, place: str, pattern: str) -> None:
-    page.locator(place).filter(has_text=re.compile(pattern)).first.wait_for()
-
-
-@pytest.fixture
-def dropping(browser: Browser, tmp_path: Path, ros_domain_id: int) -> Iterator[Page]:
+def test_what_the_pipeline_does_not_have(
+    browser: Browser, tmp_path: Path, ros_domain_id: int
+) -> None:
     path = tmp_path / "dropping.yaml"
     path.write_text(SYSTEM, encoding="utf-8")
     path.with_name("dropping.py").write_text(SOURCE, encoding="utf-8")
-    with RunningSystem(str(path)) as system:
+    with (
+        RunningSystem(str(path)) as system,
+        dashboard(path.name, cwd=tmp_path) as server,
+        opened(browser, server.address) as page,
+    ):
         system.wait_for("2 of 2 nodes active")
-        with (
-            dashboard(path.name, cwd=tmp_path) as server,
-            opened(browser, server.address) as page,
-        ):
-            yield page
-
-
-def test_what_the_pipeline_does_not_have(dropping: Page) -> None:
-    page = dropping
-    expect(page, ".world .drop-label", r"^\d+ dropped$")
-    assert page.locator(".world path.lossy").count() == 1
-    page.keyboard.press("7")
-    expect(page, ".chain[data-tone=good]", r"through.*mean [\d.]+ .s.*budget 10(\.0)? s|10,?000")
-    expect(page, ".chain", r"0 of [1-9][\d,]* over the budget")
-    # Declared choices are a list.
-    visit(page, "/parameters/source")
-    mode, gear = page.get_by_label("mode"), page.get_by_label("gear")
-    expect(page, "[data-name=mode]", "one of: slow, fast, very")
-    assert mode.locator("option").all_inner_texts() == ["slow", "fast, very"]
-    assert mode.input_value() == "slow"
-    mode.select_option("fast, very")
-    expect(page, "[data-name=mode] .outcome", "^Set$")
-    gear.select_option("3")
-    expect(page, "[data-name=gear] .outcome", "^Set$")
-    expect(page, "[data-name=gear] .declared", r"^declared 1 at dropping\.yaml:\d+:\d+$")
-    for name, value in (("mode", "fast, very"), ("gear", "3")):
-        assert listed((value,), "param", "get", "/source", name).strip().endswith(value)
+        expect_text(page.locator(".world .drop-label"), r"^\d+ dropped$")
+        assert page.locator(".world path.lossy").count() == 1
+        page.keyboard.press("7")
+        expect_text(
+            page.locator(".chain[data-tone=good]"),
+            r"through.*mean [\d.]+ .s.*budget 10(\.0)? s|10,?000",
+        )
+        expect_text(page.locator(".chain"), r"0 of [1-9][\d,]* over the budget")
+        # Declared choices are a list.
+        visit(page, "/parameters/source")
+        mode, gear = page.get_by_label("mode"), page.get_by_label("gear")
+        expect_text(page.locator("[data-name=mode]"), "one of: slow, fast, very")
+        assert mode.locator("option").all_inner_texts() == ["slow", "fast, very"]
+        assert mode.input_value() == "slow"
+        mode.select_option("fast, very")
+        expect_text(page.locator("[data-name=mode] .outcome"), "^Set$")
+        gear.select_option("3")
+        expect_text(page.locator("[data-name=gear] .outcome"), "^Set$")
+        expect_text(
+            page.locator("[data-name=gear] .declared"), r"^declared 1 at dropping\.yaml:\d+:\d+$"
+        )
+        for name, value in (("mode", "fast, very"), ("gear", "3")):
+            assert listed((value,), "param", "get", "/source", name).strip().endswith(value)
 
 
 def test_the_deployment_shows_processes_and_restarts(
@@ -108,7 +104,9 @@ def test_the_deployment_shows_processes_and_restarts(
         with dashboard(str(path)) as server, opened(browser, server.address) as page:
             page.goto("/graph?view=deployment")
             running = page.locator('.world .cluster[data-state="active"] text')
-            expect(page, ".cluster text", f"^default: events · pid {system.process.pid}$")
+            expect_text(
+                page.locator(".cluster text"), f"^default: events · pid {system.process.pid}$"
+            )
             running.filter(has_text=re.compile(r"^process other · pid \d+$")).wait_for()
             killed = local_systems()["/split/other"]
             os.kill(int(killed), signal.SIGKILL)
@@ -122,14 +120,14 @@ def test_a_graph_without_a_system(browser: Browser, ros_domain_id: int) -> None:
         dashboard() as server,
         opened(browser, server.address) as page,
     ):
-        expect(page, '.world [data-key="node:/lab/talker"]', "talker")
-        expect(page, ".world [data-label]", r"[45]\d\.?\d* Hz")  # about 50
-        expect(page, ".activity", "^1 nodes?$")
+        expect_text(page.locator('.world [data-key="node:/lab/talker"]'), "talker")
+        expect_text(page.locator(".world [data-label]"), r"[45]\d\.?\d* Hz")  # about 50
+        expect_text(page.locator(".activity"), "^1 nodes?$")
         assert page.locator("#bar [data-command]").count() == 0
         page.goto("/nodes/lab/talker")
-        expect(page, "aside.detail:visible .state", "no lifecycle")
+        expect_text(page.locator("aside.detail:visible .state"), "no lifecycle")
         assert page.locator("button[data-transition]").count() == 0
         page.goto("/nodes?show=plan")
-        expect(page, ".empty", "needs the file of the system")
+        expect_text(page.locator(".empty"), "needs the file of the system")
         page.goto("/timing")
-        expect(page, ".empty:visible", r"\w")
+        expect_text(page.locator(".empty:visible"), r"\w")

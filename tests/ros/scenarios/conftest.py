@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,17 +11,20 @@ from composer.loading import load
 from composer.scenarios.runner import Options, Result, run_scenario
 
 ROOT = Path(__file__).parents[3]
-#: Runs a scenario of the project.
-Run = Callable[[str], Result]
+
+
+def copied_to(path: Path) -> Path:
+    """Copy the project into an empty folder; return the folder."""
+    for folder in ("systems", "nodes", "interfaces", "scenarios"):
+        shutil.copytree(ROOT / folder, path / folder)
+    shutil.copy(ROOT / "composer.yaml", path)
+    return path
 
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
     """The folder of the copy."""
-    for folder in ("systems", "nodes", "interfaces", "scenarios"):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
-    shutil.copy(ROOT / "composer.yaml", tmp_path)
-    return tmp_path
+    return copied_to(tmp_path)
 
 
 def run(path: Path) -> Result:

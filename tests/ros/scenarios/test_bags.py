@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,14 +19,15 @@ from composer.scenarios.runner import Result
 from composer.testing import SystemTest
 from composer.testing.bag_messages import shift_stamps
 from composer.testing.system_run import load_system
-from tests.ros.scenarios.conftest import run
+from tests.ros.scenarios.conftest import copied_to, run
 
 REPLAY = "replay: {bag: ../bag, replace: [sensor_simulator]"
 
 
-@pytest.fixture
-def recorded(project: Path) -> Path:
-    """Five seconds of the pipeline, in the folder ``bag`` of the project."""
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) -> Path:
+    """A project with five seconds of the pipeline in its folder ``bag``."""
+    project = copied_to(tmp_path_factory.mktemp("project"))
     with SystemTest(project / "systems" / "pipeline.yaml", record_to=project / "bag") as system:
         system.advance(5.0)
     [line] = system.recorded
@@ -94,9 +96,12 @@ def with_damaged_chunks(data: bytes) -> bytes:
 def test_a_damaged_bag_fails_the_step(
     damage: Callable[[bytes], bytes], text: str, recorded: Path
 ) -> None:
-    [file] = (recorded / "bag").glob("*.mcap")
+    damaged = recorded / text.replace(" ", "_")
+    shutil.copytree(recorded / "bag", damaged)
+    [file] = damaged.glob("*.mcap")
     file.write_bytes(damage(file.read_bytes()))
-    [failure] = _run(recorded, f"steps: [{{{REPLAY}}}}}]\nallow_errors: true").failures
+    replay = REPLAY.replace("../bag", f"../{damaged.name}")
+    [failure] = _run(recorded, f"steps: [{{{replay}}}}}]\nallow_errors: true").failures
     assert failure.expected == "'replay' to work"
     assert text in failure.seen
 

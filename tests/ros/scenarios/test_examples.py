@@ -1,7 +1,8 @@
-"""Every example system does what its scenario says, twice the same; JUnit XML reports it."""
+"""Examples, the project in the guide and new projects pass their own scenarios and tests."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,13 +10,17 @@ from pathlib import Path
 import pytest
 from junitparser import JUnitXml, TestCase
 
+from tests.ros.support.commands import output_of
+
 ROOT = Path(__file__).parents[3]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.yaml"))
+#: A file of a project in the guide to testing.
+FILE = re.compile(r"```(?:yaml|python)\n# (\S+)\n(.*?)```", re.DOTALL)
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, TestCase]:
-    """The results of the second runs of all scenarios, by file."""
+    """The results of the second runs of all scenarios, by file; JUnit XML reports them."""
     report = tmp_path_factory.mktemp("report") / "junit.xml"
     options = ("--repeat", "2", "-j", "2", "--junit", str(report))
     command = [sys.executable, "-m", "composer", "test", *options]
@@ -34,3 +39,32 @@ def test_example(path: Path, results: dict[str, TestCase]) -> None:
 def test_every_example_has_a_scenario() -> None:
     systems = {path.stem for path in (ROOT / "systems").glob("*.yaml")}
     assert {path.stem for path in SCENARIOS} == systems
+
+
+def passed_tests(folder: Path, *arguments: str) -> str:
+    """Run the tests of a project; return the last line of the output."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False, timeout=150
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout.splitlines()[-1]
+
+
+def test_the_tests_in_the_guide_pass(tmp_path: Path) -> None:
+    guide = ROOT / "docs" / "guides" / "testing.md"
+    files = FILE.findall(guide.read_text(encoding="utf-8"))
+    assert len(files) == 5
+    (tmp_path / "composer.yaml").touch()
+    for name, text in files:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert passed_tests(tmp_path, "--rootdir=.", "tests", "scenarios").startswith("4 passed")
+
+
+def test_the_tests_of_a_new_project_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    output_of("new", "project", "my_robot")
+    monkeypatch.chdir(tmp_path / "my_robot")
+    output_of("new", "node", "gripper")
+    assert passed_tests(tmp_path / "my_robot").startswith("4 passed")
