@@ -36,25 +36,22 @@ def test_frames_of_the_server() -> None:
     assert service_response(call, b"x") == b"\x03\x01\0\0\0\x02\0\0\0\x03\0\0\0cdrx"
 
 
+MALFORMED = (
+    (b"", "an empty message is not known"),
+    (b"\x03abc", "a binary message with opcode 3 is not known"),
+    (b"\x01ab", "a binary message with opcode 1 ends after 3 bytes"),
+    (b"\x02" + bytes(8), "a binary message with opcode 2 ends after 9 bytes"),
+    (b"\x02" + struct.pack("<III", 1, 2, 9) + b"cdr", "ends after 16 bytes"),
+)
+
+
 def test_frames_of_clients() -> None:
     assert parse_binary(b"\x01\x05\0\0\0abc") == ClientMessage(5, b"abc")
     frame = b"\x02" + struct.pack("<III", 1, 2, 3) + b"cdrdata"
     assert parse_binary(frame) == ServiceCall(1, 2, "cdr", b"data")
-
-
-@pytest.mark.parametrize(
-    ("frame", "reason"),
-    [
-        (b"", "an empty message is not known"),
-        (b"\x03abc", "a binary message with opcode 3 is not known"),
-        (b"\x01ab", "a binary message with opcode 1 ends after 3 bytes"),
-        (b"\x02" + bytes(8), "a binary message with opcode 2 ends after 9 bytes"),
-        (b"\x02" + struct.pack("<III", 1, 2, 9) + b"cdr", "ends after 16 bytes"),
-    ],
-)
-def test_malformed_frames(frame: bytes, reason: str) -> None:
-    with pytest.raises(BadRequestError, match=reason):
-        parse_binary(frame)
+    for malformed, reason in MALFORMED:
+        with pytest.raises(BadRequestError, match=reason):
+            parse_binary(malformed)
 
 
 @given(st.binary(max_size=40) | st.text(max_size=60))
@@ -98,17 +95,16 @@ def test_constants_and_defaults(tmp_path: Path) -> None:
     )
 
 
-def test_what_is_not_known_has_no_schema(tmp_path: Path) -> None:
-    found = schemas(tmp_path, msg__A="missing_msgs/B b\n", srv__S="bool a\n---\nmissing_msgs/B b\n")
+def test_services_have_two_schemas_and_what_is_not_known_has_none(tmp_path: Path) -> None:
+    lacks = "missing_msgs/B b\n"
+    found = schemas(
+        tmp_path, srv__S="bool a\n---\nstring b\n", msg__A=lacks, srv__T=f"bool a\n---\n{lacks}"
+    )
+    assert found.service("own/srv/S") == ("bool a\n", "string b\n")
     assert found.message("own/msg/A") is None
     assert found.message("own/msg/Missing") is None
-    assert found.service("own/srv/S") is None
+    assert found.service("own/srv/T") is None
     assert found.service("own/msg/A") is None
-
-
-def test_services_have_two_schemas(tmp_path: Path) -> None:
-    found = schemas(tmp_path, srv__S="bool a\n---\nstring b\n")
-    assert found.service("own/srv/S") == ("bool a\n", "string b\n")
 
 
 def test_changes() -> None:

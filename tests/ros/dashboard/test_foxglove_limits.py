@@ -125,22 +125,18 @@ def test_only_with_the_token_and_a_known_protocol(server: Dashboard) -> None:
         assert client.is_served()
 
 
-def test_simulated_time(server: Dashboard) -> None:
-    with raw(server.address) as client:
-        client.wait(lambda: "time" in client.capabilities)
-        client.wait(lambda: len(client.frames) > 5)
-    times = [struct.unpack("<BQ", frame) for frame in client.frames]
+def test_simulated_time_and_a_latched_map_reach_every_client(server: Dashboard) -> None:
+    with raw(server.address) as first, raw(server.address) as second:
+        first.wait(lambda: "time" in first.capabilities)
+        first.wait(lambda: len(first.frames) > 5)
+        times = [struct.unpack("<BQ", frame) for frame in first.frames]
+        for client in (first, second):
+            client.subscribe("/map")
+            client.wait(lambda client=client: any(frame[0] == 1 for frame in client.frames))
     assert {opcode for opcode, _ in times} == {2}
     seconds = [time_ns / 1e9 for _, time_ns in times]
     assert seconds == sorted(seconds)
     assert 1000 < seconds[0] < 100_000
-
-
-def test_a_latched_map_reaches_every_client(server: Dashboard) -> None:
-    with raw(server.address) as first, raw(server.address) as second:
-        for client in (first, second):
-            client.subscribe("/map")
-            client.wait(lambda client=client: any(frame[0] == 1 for frame in client.frames))
 
 
 def test_it_can_be_switched_off(shared_domain_id: int) -> None:

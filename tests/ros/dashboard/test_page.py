@@ -147,7 +147,7 @@ def legal_transitions(peer: Peer, node: str) -> list[str]:
     return sorted(item.transition.label for item in response.available_transitions)
 
 
-def test_a_node_is_restarted_by_click(view: Page, peer: Peer) -> None:
+def test_nodes_are_restarted_by_click_also_after_a_shutdown(view: Page, peer: Peer) -> None:
     events = peer.listen(TransitionEvent, f"{PLANNER}/transition_event", 100)
     peer.wait_until_known(PLANNER)
     view.goto(f"/nodes{PLANNER}")
@@ -157,10 +157,9 @@ def test_a_node_is_restarted_by_click(view: Page, peer: Peer) -> None:
     wait_until(lambda: [event.goal_state.label for event in events if ends(event)] == passed)
     expect_text(detail(view).locator(".state"), "^active")
     assert sorted(buttons(view)) == sorted([*legal_transitions(peer, PLANNER), "restart"])
-
-
-def test_a_node_that_is_shut_down_is_created_again(view: Page) -> None:
-    view.goto(f"/nodes{CONTROLLER}")
+    # One that is shut down is created again.
+    visit(view, f"/nodes{CONTROLLER}")
+    expect_text(detail(view), re.escape(CONTROLLER))
     view.click("button[data-transition=shutdown]")
     expect_text(view.locator("dialog"), "Only a restart makes it usable again")
     view.click("dialog >> button:text-is('Shutdown')")
@@ -209,36 +208,34 @@ def test_the_plan_has_a_cause_for_each_step(view: Page) -> None:
     assert shown == steps
 
 
-def test_parameters_are_described(view: Page) -> None:
+def test_parameters_are_described_changed_and_refused(view: Page) -> None:
     view.goto("/parameters/lab/talker")
     expect_text(view.locator("[data-name=speed] .hint"), r"^0 … 5 · How fast\.$")
     visit(view, f"/parameters{PLANNER}")
     line = view.locator("[data-name=max_velocity]")
+    value, outcome = line.locator("input[type=text]"), line.locator(".outcome")
     expect_text(line, r"max_velocity double.*m/s")
     expect_text(line.locator(".hint"), r"^0.01 … 5 m/s · Speed limit of every plan\.$")
-    view.get_by_label("Search parameters").fill("between two points")
+    search = view.get_by_label("Search parameters")
+    search.fill("between two points")
     expect_text(view.locator(".parameter:visible"), "sample_period_ms")
     line.wait_for(state="hidden")
-
-
-def test_a_parameter_is_changed_and_refused(view: Page) -> None:
-    view.goto(f"/parameters{PLANNER}")
-    line = view.locator("[data-name=max_velocity]")
-    line.locator("input[type=text]").fill("1.5")
+    search.fill("")
+    value.fill("1.5")
     view.keyboard.press("Enter")
-    expect_text(line.locator(".outcome"), "Set")
+    expect_text(outcome, "Set")
     listed(("1.5",), "param", "get", PLANNER, "max_velocity")
-    line.locator("input[type=text]").fill("50")
+    value.fill("50")
     view.keyboard.press("Enter")
     expect_text(line.locator(".outcome[data-tone=bad]"), "at most 5|between|range|maximum")
     listed(("1.5",), "param", "get", PLANNER, "max_velocity")
-    line.locator("input[type=text]").fill("fast")
+    value.fill("fast")
     view.keyboard.press("Enter")
-    expect_text(line.locator(".outcome"), "a number is expected")
+    expect_text(outcome, "a number is expected")
     view.keyboard.press("Escape")
-    wait_until(lambda: line.locator("input[type=text]").input_value() == "1.5", "the value")
+    wait_until(lambda: value.input_value() == "1.5", "the value")
     line.locator("input[type=range]").fill("1")
-    expect_text(line.locator(".outcome"), "Set")
+    expect_text(outcome, "Set")
 
 
 def test_the_drift_is_shown_until_it_is_gone(view: Page) -> None:
@@ -264,19 +261,7 @@ def test_the_drift_is_shown_until_it_is_gone(view: Page) -> None:
     wait_until(lambda: shows(is_wrong=False), "no difference")
 
 
-def test_the_log_is_filtered_and_leads_to_nodes(view: Page) -> None:
-    view.goto("/log")
-    expect_text(view.locator(".log li"), "driving to")
-    view.get_by_label("Node").fill("planner")
-    view.wait_for_url("**node=planner**")
-    expect_text(view.locator(".empty:visible"), "No log lines")
-    view.get_by_label("Node").fill("motor")
-    expect_text(view.locator(".log li"), "driving to")
-    view.click(".log li a >> nth=0")
-    view.wait_for_url("**/nodes/control/motor_controller")
-
-
-def test_the_log_is_filtered_by_level_and_paused(own_view: Page, peer: Peer) -> None:
+def test_the_log_is_filtered_and_paused_and_leads_to_nodes(own_view: Page, peer: Peer) -> None:
     log, lines = peer.node.get_logger(), own_view.locator(".log li .text")
     sockets: list[WebSocketRoute] = []
 
@@ -309,6 +294,15 @@ def test_the_log_is_filtered_by_level_and_paused(own_view: Page, peer: Peer) -> 
     wait_until(lambda: own_view.title() and len(sockets) > 1)
     log.fatal("mark 6")
     expect_texts(lines, "mark 3", "mark 4", "mark 5", "mark 6")
+    visit(own_view, "/log")
+    expect_text(own_view.locator(".log li"), "driving to")
+    own_view.get_by_label("Node").fill("planner")
+    own_view.wait_for_url("**node=planner**")
+    expect_text(own_view.locator(".empty:visible"), "No log lines")
+    own_view.get_by_label("Node").fill("motor")
+    expect_text(own_view.locator(".log li"), "driving to")
+    own_view.click(".log li a >> nth=0")
+    own_view.wait_for_url("**/nodes/control/motor_controller")
 
 
 def test_timers_are_sorted_by_lateness_and_have_histograms(view: Page) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import functools
 import io
 import re
 from typing import TYPE_CHECKING, Any
@@ -31,10 +30,6 @@ SERIES = {
     "/sensor_data:pose.pose.position.x": lambda message: message.pose.pose.position.x,
     "/sensor_data:twist.twist.linear.x": lambda message: message.twist.twist.linear.x,
 }
-
-
-def has_until(values: dict[float, float], end: float) -> bool:
-    return max(values) >= end
 
 
 def test_exported_values_are_those_published(view: Page, peer: Peer) -> None:
@@ -67,7 +62,7 @@ def test_exported_values_are_those_published(view: Page, peer: Peer) -> None:
     for column, name in enumerate(SERIES, 1):
         exported = {float(row[0]): float(row[column]) for row in rows if row[column]}
         first, last = min(exported), max(exported)
-        wait_until(functools.partial(has_until, published[name], last), f"the last of {name}")
+        wait_until(lambda name=name, last=last: max(published[name]) >= last, f"the last of {name}")
         known = published[name].copy()  # it grows on another thread
         expected = {at: value for at, value in known.items() if first <= at <= last}
         # A busy machine may lose messages of best effort, here or there, where they are counted.
@@ -190,7 +185,7 @@ def test_only_what_is_on_the_screen_is_subscribed(view: Page, peer: Peer) -> Non
     wait_until(lambda: peer.node.count_subscribers("/lab/text") == 0)
 
 
-def test_a_service_is_called(view: Page) -> None:
+def test_services_are_called_also_with_lists_and_ranges(view: Page) -> None:
     view.goto("/services")
     view.click("tbody a:has-text('/plan_trajectory')")
     view.locator("fieldset", has_text="goal").get_by_label("x").fill("1")
@@ -202,10 +197,7 @@ def test_a_service_is_called(view: Page) -> None:
     view.get_by_label("data").check()
     view.click("form >> text=Call")
     expect_text(detail(view).locator(".message"), "switched")
-
-
-def test_a_request_with_lists_and_ranges(view: Page) -> None:
-    view.goto("/services/lab/talker/set_parameters")  # hidden, unless it is chosen
+    visit(view, "/services/lab/talker/set_parameters")  # hidden, unless it is chosen
     form = view.locator("form.fields")
     form.get_by_text("Add item").first.click()
     form.locator(field("name")).fill("speed")

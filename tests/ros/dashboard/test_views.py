@@ -6,8 +6,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from composer.client.run_log import find_runs, last_records
 from tests.ros.support.dashboard import Browser
 from tests.ros.support.in_process import wait_until
@@ -92,63 +90,41 @@ def test_services_for_tools_are_hidden(page: Browser) -> None:
 
 
 TEXT = {"topic": "/lab/in", "type": "std_msgs/msg/String"}
+ADD = {"service": "/lab/add", "type": "std_srvs/srv/SetBool"}
+EMPTY = {"service": "/no", "type": "std_srvs/srv/Empty"}
 SPEED = {"node": PLANNER, "name": "max_velocity"}
 
 
-@pytest.mark.parametrize(
-    ("op", "values", "code", "reason"),
-    [
-        ("transition", {"node": PLANNER, "transition": "activate"}, "rejected", "deactivate"),
-        ("transition", {"node": "/no", "transition": "cleanup"}, "not_found", "/no"),
-        ("node", {"node": "/missing"}, "not_found", "/missing"),
-        ("set_parameter", {**SPEED, "value": 99}, "rejected", "max_velocity"),
-        ("set_parameter", {**SPEED, "value": "fast"}, "rejected", "max_velocity"),
-        ("publish", {**TEXT, "message": {"data": 5}}, "bad_request", "data takes a string"),
-        (
-            "call",
-            {"service": "/lab/add", "type": "std_srvs/srv/SetBool", "request": {"dat": 1}},
-            "bad_request",
-            "did you mean 'data'?",
-        ),
-        (
-            "call",
-            {"service": "/no", "type": "std_srvs/srv/Empty", "request": {}, "timeout_s": 0.3},
-            "no_response",
-            "/no",
-        ),
-    ],
-)
-def test_a_request_that_fails_says_why(
-    op: str, values: dict[str, Any], code: str, reason: str, page: Browser
-) -> None:
+REQUESTS: list[tuple[str, dict[str, Any], str, str]] = [
+    ("transition", {"node": PLANNER, "transition": "activate"}, "rejected", "deactivate"),
+    ("transition", {"node": "/no", "transition": "cleanup"}, "not_found", "/no"),
+    ("node", {"node": "/missing"}, "not_found", "/missing"),
+    ("set_parameter", {**SPEED, "value": 99}, "rejected", "max_velocity"),
+    ("set_parameter", {**SPEED, "value": "fast"}, "rejected", "max_velocity"),
+    ("publish", {**TEXT, "message": {"data": 5}}, "bad_request", "data takes a string"),
+    ("call", {**ADD, "request": {"dat": 1}}, "bad_request", "did you mean 'data'?"),
+    ("call", {**EMPTY, "request": {}, "timeout_s": 0.3}, "no_response", "/no"),
+]
+SUBSCRIPTIONS: list[tuple[str, dict[str, Any], str, str]] = [
+    ("echo", {"topic": "/nothing"}, "not_found", "nothing publishes '/nothing'"),
+    (
+        "plot",
+        {"series": [{"topic": "/sensor_data", "field": "pose.poze"}]},
+        "bad_request",
+        "did you mean 'pose'?",
+    ),
+    ("plot", {"series": [{"topic": "/lab/text", "field": "data"}]}, "bad_request", "not a number"),
+]
+
+
+def test_requests_and_subscriptions_that_fail_say_why(page: Browser) -> None:
     page.until(page.subscribe("nodes"), lambda data: {PLANNER, TALKER} <= _nodes(data).keys())
-    error = page.error(op, **values)
-    assert error["code"] == code, error
-    assert reason in f"{error['message']} {error['hint']}"
-
-
-@pytest.mark.parametrize(
-    ("channel", "parameters", "code", "reason"),
-    [
-        ("echo", {"topic": "/nothing"}, "not_found", "nothing publishes '/nothing'"),
-        (
-            "plot",
-            {"series": [{"topic": "/sensor_data", "field": "pose.poze"}]},
-            "bad_request",
-            "did you mean 'pose'?",
-        ),
-        (
-            "plot",
-            {"series": [{"topic": "/lab/text", "field": "data"}]},
-            "bad_request",
-            "not a number",
-        ),
-    ],
-)
-def test_a_subscription_that_fails_says_why(
-    channel: str, parameters: dict[str, Any], code: str, reason: str, page: Browser
-) -> None:
     page.until(page.subscribe("topics"), lambda data: "/lab/text" in str(data["topics"]))
-    error = page.failure(page.subscribe(channel, **parameters))
-    assert error["code"] == code, error
-    assert reason in f"{error['message']} {error['hint']}"
+    failures = [(page.error(op, **values), *rest) for op, values, *rest in REQUESTS]
+    failures += [
+        (page.failure(page.subscribe(channel, **values)), *rest)
+        for channel, values, *rest in SUBSCRIPTIONS
+    ]
+    for error, code, reason in failures:
+        assert error["code"] == code, error
+        assert reason in f"{error['message']} {error['hint']}"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from composer.loading import load
 from composer.scenarios.runner import Options, Result, run_scenario
+from tests.ros.support.forked import ForkedCommand
 
 ROOT = Path(__file__).parents[3]
 
@@ -33,3 +35,10 @@ def run(path: Path) -> Result:
     assert loaded.scenario is not None, loaded.diagnostics
     assert loaded.system is not None
     return run_scenario(loaded.scenario, loaded.system, Options())
+
+
+def compose_in(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder; return its result, whatever the exit code."""
+    process = ForkedCommand(*map(str, arguments), cwd=folder)
+    output, error = process.communicate(timeout=150.0)
+    return subprocess.CompletedProcess(process.args, process.wait(), output, error)

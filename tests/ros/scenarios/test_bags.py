@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from composer.scenarios.runner import Result
 from composer.testing import SystemTest
 from composer.testing.bag_messages import shift_stamps
 from composer.testing.system_run import load_system
-from tests.ros.scenarios.conftest import copied_to, run
+from tests.ros.scenarios.conftest import compose_in, copied_to, run
 
 REPLAY = "replay: {bag: ../bag, replace: [sensor_simulator]"
 
@@ -106,27 +104,20 @@ def test_a_damaged_bag_fails_the_step(
     assert text in failure.seen
 
 
-def _compose(folder: Path, *arguments: str | Path) -> str:
-    command = [sys.executable, "-m", "composer", *map(str, arguments)]
-    done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, check=False, timeout=60
-    )
-    return done.stdout
-
-
 def test_a_failed_run_leaves_a_bag(project: Path) -> None:
     (project / "scenarios" / "wrong.yaml").write_text(
         "scenario: too fast\nsystem: pipeline\nfor_s: 5\n"
         "steps: [{at_s: 2, publish: {/sensor_data: {}}}]\n"
         "expect: [{message: /motor_commands, where: message.linear.x > 9}]\n"
     )
-    output = _compose(project, "test", "--bag-on-failure", "-k", "minimal or wrong")
+    output = compose_in(project, "test", "--bag-on-failure", "-k", "minimal or wrong").stdout
     assert "passed  scenarios/minimal.yaml" in output
     [folder] = (project / "bags").iterdir()
     [bag] = folder.iterdir()
     assert f" messages: {bag.relative_to(project)}" in output
     assert open_bag(bag).summary.counts["/sensor_data"] == 151
     words = ("replay", bag, "systems/pipeline.yaml", "--replace", "sensor_simulator")
-    assert "equal to the messages of the bag" in _compose(project, *words, "--compare", bag)
-    _compose(project, "test", "--bag-on-failure", "-k", "minimal")
+    done = compose_in(project, *words, "--compare", bag)
+    assert "equal to the messages of the bag" in done.stdout
+    compose_in(project, "test", "--bag-on-failure", "-k", "minimal")
     assert list((project / "bags").iterdir()) == [folder]

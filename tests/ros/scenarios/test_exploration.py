@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from composer.model.scenario import Verb
 from composer.scenarios.exploration import Fault
+from tests.ros.scenarios.conftest import compose_in
 
 #: ``brake`` computes a speed from the distances at its last two calls. It is right as long as
 #: exactly one message arrives between them.
@@ -79,13 +78,6 @@ def test_words(fault: Fault, text: str, yaml: str) -> None:
     assert (str(fault), fault.yaml) == (text, yaml)
 
 
-def _compose_test(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "composer", "test", *arguments]
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, check=False, timeout=300
-    )
-
-
 def test_a_race_is_found_and_can_be_repeated(tmp_path: Path) -> None:
     (tmp_path / "composer.yaml").touch()
     (tmp_path / "race.yaml").write_text(SYSTEM)
@@ -93,8 +85,8 @@ def test_a_race_is_found_and_can_be_repeated(tmp_path: Path) -> None:
     paths = [tmp_path / "scenarios" / f"{number}.yaml" for number in range(len(RACES))]
     for path, bounds in zip(paths, RACES, strict=True):
         path.write_text(SCENARIO.replace("BOUNDS", bounds))
-    explored = _compose_test(tmp_path, "--explore", "20", "--seed", "4").stdout
-    again = _compose_test(tmp_path, "--explore", "20", "--seed", "4", str(paths[-1])).stdout
+    explored = compose_in(tmp_path, "test", "--explore", "20", "--seed", "4").stdout
+    again = compose_in(tmp_path, "test", "--explore", "20", "--seed", "4", str(paths[-1])).stdout
     reports = explored.split("race failed\n")[1:]
     assert again.split("race failed\n")[1] == reports[-1]
     for path, report, text in zip(paths, reports, RACES.values(), strict=True):
@@ -104,7 +96,7 @@ def test_a_race_is_found_and_can_be_repeated(tmp_path: Path) -> None:
         path.write_text("\n".join([path.read_text(), *block]))
     seen = re.findall("seen: .*", explored)
     assert len(seen) == len(RACES)
-    assert re.findall("seen: .*", _compose_test(tmp_path).stdout) == seen
+    assert re.findall("seen: .*", compose_in(tmp_path, "test").stdout) == seen
     assert {path.name for path in tmp_path.iterdir()} == {"composer.yaml", "race.yaml", "scenarios"}
 
 
@@ -115,5 +107,5 @@ def test_where_nothing_varies_but_the_seed(tmp_path: Path) -> None:
     scenario = SCENARIO.replace("BOUNDS", "{jitter_ms: 5, drop: 1, reorder: 1}")
     path = tmp_path / "scenario.yaml"
     path.write_text(scenario.partition("expect:")[0].replace("../race", "race"))
-    done = _compose_test(tmp_path, "--explore", "2", str(path))
+    done = compose_in(tmp_path, "test", "--explore", "2", str(path))
     assert re.fullmatch("passed .*, 2 variations\n", done.stdout)
