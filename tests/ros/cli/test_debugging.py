@@ -5,16 +5,11 @@ from __future__ import annotations
 import json
 import re
 import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import pytest
-import rclpy
 import yaml
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int32
 
@@ -28,6 +23,7 @@ from tests.ros.support.commands import (
     repeated_until,
     start,
 )
+from tests.ros.support.in_process import Peer, wait_until
 
 pytestmark = pytest.mark.usefixtures("talker")
 
@@ -129,16 +125,23 @@ def test_echo_ends_quietly_at_ctrl_c() -> None:
 
 
 @pytest.mark.timeout(240)
-def test_echo_and_hz_agree_with_a_plain_subscription() -> None:
-    with plain_subscription() as received:
-        # A process that starts after the first message, or is not scheduled during the first or
-        # last one, sees other messages: try again with more time.
-        for lead in (150, 300, 600, 600, 600, 600):
-            values, seen_s, rate = side_by_side(received, lead)
-            by_hand_hz = (len(seen_s) - 1) / (max(seen_s.values()) - min(seen_s.values()))
-            close_hz = pytest.approx(by_hand_hz, rel=0.01)
-            if len(seen_s) == len(values) and rate["average_hz"] == close_hz:
-                break
+def test_echo_and_hz_agree_with_a_plain_subscription(peer: Peer) -> None:
+    received: list[tuple[float, int]] = []  # the time and the number of each message
+    peer.node.create_subscription(
+        Int32,
+        "/lab/count",
+        lambda message: received.append((time.monotonic(), message.data)),
+        QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT),  # for a busy machine
+    )
+    wait_until(lambda: received, "a message")
+    # A process that starts after the first message, or is not scheduled during the first or last
+    # one, sees other messages: try again with more time.
+    for lead in (150, 300, 600, 600, 600, 600):
+        values, seen_s, rate = side_by_side(received, lead)
+        by_hand_hz = (len(seen_s) - 1) / (max(seen_s.values()) - min(seen_s.values()))
+        close_hz = pytest.approx(by_hand_hz, rel=0.01)
+        if len(seen_s) == len(values) and rate["average_hz"] == close_hz:
+            break
     assert len(set(values) & seen_s.keys()) == pytest.approx(len(seen_s), rel=0.01)
     assert len(values) == pytest.approx(len(seen_s), rel=0.01)
     assert rate["window"] == 249
@@ -159,45 +162,9 @@ def side_by_side(
     by_hz = start("topic", "hz", "/lab/count", *since, "--json")
     rate = json.loads(finished(by_hz).splitlines()[-1])
     values = [int(line) for line in finished(by_echo).splitlines()]
-    until_s = time.monotonic() + PATIENCE_S
-    while received[-1][1] < values[-1]:
-        assert time.monotonic() < until_s
-        time.sleep(0.02)
+    wait_until(lambda: received[-1][1] >= values[-1], "the last value")
     seen_s = {value: at_s for at_s, value in tuple(received) if first <= value <= values[-1]}
     return values, seen_s, rate
-
-
-@contextmanager
-def plain_subscription() -> Iterator[list[tuple[float, int]]]:
-    """Yield a list to which a plain subscription adds the time and the number of each message.
-
-    It has received a message already; its queue is deep enough for a busy machine.
-    """
-    received: list[tuple[float, int]] = []
-    context = rclpy.Context()
-    context.init([])
-    node = rclpy.create_node("by_hand", context=context)
-    node.create_subscription(
-        Int32,
-        "/lab/count",
-        lambda message: received.append((time.monotonic(), message.data)),
-        QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT),
-    )
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    try:
-        until_s = time.monotonic() + PATIENCE_S
-        while not received:
-            assert time.monotonic() < until_s
-            time.sleep(0.02)
-        yield received
-    finally:
-        executor.shutdown()
-        thread.join()
-        node.destroy_node()
-        context.try_shutdown()
 
 
 def test_hz_prints_text() -> None:

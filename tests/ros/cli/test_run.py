@@ -19,11 +19,6 @@ from tests.ros.support.commands import COMPOSE, PATIENCE_S, compose, listed, run
 from tests.ros.support.in_process import Peer, wait_until
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> Path:
-    return tmp_path / "stderr.txt"
-
-
 def states_in(text: str) -> list[str]:
     """Return the state changes in the log, as 'node state'."""
     lines = [line.rpartition("[compose] ")[2] for line in text.splitlines() if "[compose]" in line]
@@ -66,8 +61,10 @@ def sent_by_the_first_node(text: str) -> int:
     return int(first_row_of_the_summary(text)[3])
 
 
-def test_simulated_time_can_be_enabled_and_disabled(log: Path) -> None:
-    with running(log, "talker_listener", "--use-sim-time", "--for", "60") as run:
+def test_simulated_time_can_be_enabled_and_disabled(tmp_path: Path) -> None:
+    with running(
+        tmp_path / "stderr.txt", "talker_listener", "--use-sim-time", "--for", "60"
+    ) as run:
         run.wait_for("2 of 2 nodes active")
         assert listed(("\n",), "param", "get", "/talker", "use_sim_time") == "true\n"
         assert "Received" not in run.log.read_text()  # there is no /clock
@@ -75,18 +72,37 @@ def test_simulated_time_can_be_enabled_and_disabled(log: Path) -> None:
         run.wait_for("Received: Sensor reading 0")
 
 
-def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None:
-    (tmp_path / "sour.py").write_text(
-        "from composer.behavior import Behavior\n\n\n"
-        "class Sour(Behavior):\n"
-        "    def on_activate(self) -> None:\n"
-        "        raise RuntimeError('no milk')\n"
-    )
-    (tmp_path / "sour.yaml").write_text(
-        "system: sour\nnodes:\n  good: {}\n  bad: {behavior: 'sour:Sour'}\n"
-    )
-    path = str(tmp_path / "sour.yaml")
-    done = compose("run", path, "--for", "0.2")
+FAILING = """
+system: failing
+nodes:
+  good: {}
+  bad: {behavior: failing:Bad}
+"""
+FAILING_MODULE = """
+class Bad:
+    def on_activate(self):
+        raise RuntimeError("no milk")
+
+class Ticking:
+    def on_tick(self):
+        raise ValueError("no map")
+
+class Worse(Ticking):
+    on_tock = Ticking.on_tick
+"""
+
+
+@pytest.fixture
+def failing(tmp_path: Path) -> Path:
+    """A system with a node that does not come up."""
+    path = tmp_path / "failing.yaml"
+    path.write_text(FAILING, encoding="utf-8")
+    path.with_suffix(".py").write_text(FAILING_MODULE, encoding="utf-8")
+    return path
+
+
+def test_a_node_that_fails_ends_the_run_with_exit_code_1(failing: Path) -> None:
+    done = compose("run", failing, "--for", "0.2")
     assert done.returncode == 1
     assert "no milk" in done.stderr
     failure = "/bad is isolated: activate failed: RuntimeError: no milk"
@@ -94,7 +110,7 @@ def test_a_node_that_fails_ends_the_run_with_exit_code_1(tmp_path: Path) -> None
         r"\[WARN\].* 1 of 2 nodes active after \S+ s, /bad is isolated$", done.stderr, re.MULTILINE
     )
     assert f"\nnot up at the end: {failure}\n" in done.stderr
-    together = compose("run", path, "--all-or-nothing")
+    together = compose("run", failing, "--all-or-nothing")
     assert together.returncode == 1
     assert "rolling back because of /bad" in together.stderr
     assert states_in(together.stderr)[-1].endswith("finalized")
@@ -104,42 +120,26 @@ def test_a_background_run_that_is_not_complete_has_exit_code_1(tmp_path: Path) -
     (tmp_path / "part.yaml").write_text(
         "system: part\nnodes:\n  good: {}\n  bad: {executable: {command: [sh, -c, exit 3]}}\n"
     )
-    done = compose("run", str(tmp_path / "part.yaml"), "--wait")
+    done = compose("run", tmp_path / "part.yaml", "--wait")
     try:
         assert done.returncode == 1
         assert "compose: 1 of 2 nodes active after " in done.stderr
         assert "/bad is isolated: activate failed: its process exited with status 3" in done.stderr
         assert "end them with 'compose down', or use --all-or-nothing" in done.stderr
-        assert re.search(
-            r"^/bad +unconfigured \(isolated\)", compose("ps", "part").stdout, re.MULTILINE
-        )
+        shown = compose("ps", "part").stdout
+        assert re.search(r"^/bad +unconfigured \(isolated\)", shown, re.MULTILINE)
     finally:
         compose("down", "part")
 
 
-def test_errors_are_in_the_summary_and_may_fail_the_run(tmp_path: Path) -> None:
-    path = tmp_path / "failing.yaml"
-    path.write_text(
-        """
-        system: failing
-        nodes:
-          bad: {behavior: failing:Bad, timers: {tick: {period_ms: 10}}}
-          worse: {behavior: failing:Worse, timers: {tick: {period_ms: 10}, tock: {period_ms: 10}}}
-          good: {}
-        """,
-        encoding="utf-8",
-    )
-    path.with_suffix(".py").write_text(
-        "class Bad:\n"
-        "    def on_tick(self):\n        raise ValueError('no map')\n"
-        "class Worse(Bad):\n"
-        "    def on_tock(self):\n        raise ValueError('no map')\n",
-        encoding="utf-8",
-    )
+def test_errors_are_in_the_summary_and_may_fail_the_run(failing: Path) -> None:
+    ticking = FAILING.replace(":Bad}", ":Ticking, timers: {tick: {period_ms: 10}}}")
+    worse = "  worse:\n    behavior: failing:Worse\n    timers: {tick: {period_ms: 10}, "
+    failing.write_text(f"{ticking}{worse}tock: {{period_ms: 10}}}}\n", encoding="utf-8")
     summary = re.compile(r"^\d+ errors in nodes /worse \(\d+\), /bad \(\d+\)$", re.MULTILINE)
     for options, code in (((), 0), (("--fail-on-error",), 1)):
         for seconds in (0.4, 3, 10):  # a process may not be scheduled for a moment
-            done = compose("run", path, "--for", seconds, *options)
+            done = compose("run", failing, "--for", seconds, *options)
             if summary.search(done.stderr):
                 break
         assert done.returncode == code

@@ -16,7 +16,7 @@ import pytest
 from tests.ros.dashboard.test_foxglove_limits import raw
 from tests.ros.support.commands import COMPOSE, hand_written
 from tests.ros.support.dashboard import Address
-from tests.ros.support.in_process import end_limit_s
+from tests.ros.support.in_process import end_limit_s, wait_until
 from tests.ros.support.system_process import PATIENCE_S, RunningSystem
 
 #: Signals that follow more closely are those of a terminal and of a tool that forwards them.
@@ -73,20 +73,18 @@ def wait_until_full(process: subprocess.Popen[str]) -> None:
     assert process.stdout is not None
     descriptor = process.stdout.fileno()
     size, waiting = fcntl.fcntl(descriptor, fcntl.F_SETPIPE_SZ, PIPE_BYTES), array.array("i", [0])
-    end_s = time.monotonic() + PATIENCE_S
-    while waiting[0] < size // 2:
+
+    def is_full() -> bool:
         fcntl.ioctl(descriptor, termios.FIONREAD, waiting)
         assert process.poll() is None
-        assert time.monotonic() < end_s
-        time.sleep(0.05)  # poll: nothing announces it
+        return waiting[0] >= size // 2
+
+    wait_until(is_full, "output that fills the pipe")
 
 
 def wait_until_delivered(pid: int, number: signal.Signals) -> None:
     """Wait until a signal is not pending any more: a second one would be merged with it."""
-    end_s = time.monotonic() + PATIENCE_S
-    while _pending(pid) & (1 << (number - 1)):
-        assert time.monotonic() < end_s
-        time.sleep(0.05)  # poll: nothing announces it
+    wait_until(lambda: not _pending(pid) & (1 << (number - 1)), "the delivery of the signal")
 
 
 def _pending(pid: int) -> int:
@@ -150,10 +148,7 @@ def test_a_regular_expression_that_never_ends(tmp_path: Path, signals: int, grac
     path.write_text(CATASTROPHE, encoding="utf-8")
     path.with_name("parser.py").write_text(PARSER, encoding="utf-8")
     with RunningSystem(str(path), "--grace", grace) as system:
-        end_s = time.monotonic() + PATIENCE_S
-        while not path.with_name("parsing").exists():  # a line of the log would wait for the lock
-            assert time.monotonic() < end_s
-            time.sleep(0.05)
+        wait_until(path.with_name("parsing").exists)  # a line of the log would wait for the lock
         for _ in range(signals):
             system.process.send_signal(signal.SIGINT)
             wait_until_delivered(system.process.pid, signal.SIGINT)
