@@ -125,14 +125,13 @@ def test_malformed_requests_are_answered_with_a_reason(page: Browser) -> None:
     assert page.ok("ping")
 
 
-def test_a_program_that_sends_only_nonsense_is_disconnected(server: Dashboard) -> None:
+def test_nonsense_and_large_messages_end_only_their_connection(
+    server: Dashboard, page: Browser
+) -> None:
     with websocket(server.address) as opened:
         for _ in range(20):
             opened.send("nonsense")
         assert close_code(opened) == 1008
-
-
-def test_large_messages_end_only_their_connection(server: Dashboard, page: Browser) -> None:
     before_mb = server.memory_mb()
     for size in (2_000_000, 100_000_000):
         with websocket(server.address) as opened:
@@ -233,22 +232,19 @@ def test_images_are_sampled_and_made_smaller(page: Browser) -> None:
 
 
 def test_a_client_that_never_reads_costs_no_memory(server: Dashboard, page: Browser) -> None:
+    subscriptions = {
+        "image": {"topic": "/camera", "max_hz": 15, "max_width": 640},
+        "echo": {"topic": "/camera", "max_hz": 100, "max_items": 1024},
+        "plot": {"series": [{"topic": "/camera", "field": "width"}]},
+        "nodes": {},
+    }
     with ExitStack() as stack:
-        stalled = []
         for _ in range(5):
             opened = stack.enter_context(raw(server.address, handshake(server.address)))
             opened.recv(4096)
-            for number, (channel, parameters) in enumerate(
-                (
-                    ("image", {"topic": "/camera", "max_hz": 15, "max_width": 640}),
-                    ("echo", {"topic": "/camera", "max_hz": 100, "max_items": 1024}),
-                    ("plot", {"series": [{"topic": "/camera", "field": "width"}]}),
-                    ("nodes", {}),
-                )
-            ):
+            for number, (channel, parameters) in enumerate(subscriptions.items()):
                 request = {"id": number, "op": "subscribe", "channel": channel}
                 opened.sendall(frame(json.dumps(request | {"params": parameters}).encode()))
-            stalled.append(opened)
         count = page.subscribe("plot", series=[{"topic": "/camera", "field": "height"}])
         page.until(count, bool)
         before_mb = server.memory_mb()

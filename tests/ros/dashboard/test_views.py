@@ -42,7 +42,7 @@ def test_nodes_have_states_figures_and_places(page: Browser, pipeline: RunningSy
     assert _nodes(data)[TALKER]["state"] == ""
 
 
-def test_topics_have_endpoints_and_figures(page: Browser) -> None:
+def test_topics_and_services_have_endpoints_and_figures(page: Browser) -> None:
     channel = page.subscribe("topics", measure=["/lab/count", "/sensor_data"])
     data = page.until(
         channel,
@@ -56,6 +56,15 @@ def test_topics_have_endpoints_and_figures(page: Browser) -> None:
     assert [end["node"] for end in topic["publishers"]] == [SIMULATOR]
     assert topic["publishers"][0]["qos"]["reliability"] == "best_effort"
     assert data["figures"]["/sensor_data"]["mean_bytes"] > 700
+    # Services for tools are hidden.
+    data = page.until(
+        page.subscribe("services"),
+        lambda data: "/lab/add" in {item["name"] for item in data["services"]},
+    )
+    hidden = ("get_parameters", "/pipeline/manager/")
+    assert not any(part in item["name"] for item in data["services"] for part in hidden)
+    everything = page.subscribe("services", hidden=True)
+    page.until(everything, lambda data: all(part in str(data["services"]) for part in hidden))
 
 
 SILENT = """
@@ -76,17 +85,6 @@ def test_the_log_begins_with_what_was_logged_before(page: Browser, tmp_path: Pat
         channel = page.subscribe("log", node="/silent")
         (line,) = page.until(channel, lambda data: data["lines"])["lines"]
         assert (line["level"], line["text"]) == ("info", "before the page")
-
-
-def test_services_for_tools_are_hidden(page: Browser) -> None:
-    data = page.until(
-        page.subscribe("services"),
-        lambda data: "/lab/add" in {item["name"] for item in data["services"]},
-    )
-    hidden = ("get_parameters", "/pipeline/manager/")
-    assert not any(part in item["name"] for item in data["services"] for part in hidden)
-    everything = page.subscribe("services", hidden=True)
-    page.until(everything, lambda data: all(part in str(data["services"]) for part in hidden))
 
 
 TEXT = {"topic": "/lab/in", "type": "std_msgs/msg/String"}

@@ -59,10 +59,14 @@ def instances(system: SystemTest) -> dict[str, Any]:
     return {name: node.instance for name, node in nodes if hasattr(node, "instance")}
 
 
+def open_system(folder: Path, text: str, *, real_time: bool = False) -> SystemTest:
+    path = folder / "tested.yaml"
+    path.write_text(text)
+    return SystemTest(path, real_time=real_time)
+
+
 def test_a_class_of_each_kind(tmp_path: Path) -> None:
-    path = tmp_path / "demo.yaml"
-    path.write_text(DEMO)
-    with SystemTest(path) as system:
+    with open_system(tmp_path, DEMO) as system:
         nodes = instances(system)
         system.advance(2.0)
         assert [item.message.data for item in system.messages("/numbers")][:3] == [1, 2, 3]
@@ -116,9 +120,8 @@ def test_the_same_run_whatever_the_hash_seed(tmp_path: Path) -> None:
 
 
 def test_clocks_and_sleeps_of_all_kinds(tmp_path: Path) -> None:
-    path = tmp_path / "reader.yaml"
-    path.write_text(f'system: times\nnodes: {{reader: {{class: "{TIMED}:ClockReader"}}}}\n')
-    with SystemTest(path) as system:
+    text = f'system: times\nnodes: {{reader: {{class: "{TIMED}:ClockReader"}}}}\n'
+    with open_system(tmp_path, text) as system:
         system.advance(3.9)
         times = instances(system)["reader"].times
     assert times == [dict.fromkeys(times[0], pytest.approx(0.75))] * 3
@@ -126,9 +129,8 @@ def test_clocks_and_sleeps_of_all_kinds(tmp_path: Path) -> None:
 
 
 def test_deadlines_and_serialized_messages(tmp_path: Path) -> None:
-    path = tmp_path / "overdue.yaml"
-    path.write_text(f'system: overdue\nnodes: {{overdue: {{class: "{TIMED}:Overdue"}}}}\n')
-    with SystemTest(path) as system:
+    text = f'system: overdue\nnodes: {{overdue: {{class: "{TIMED}:Overdue"}}}}\n'
+    with open_system(tmp_path, text) as system:
         system.advance(4.5)
         overdue = instances(system)["overdue"]
         assert overdue.missed == {"offered": 3, "requested": 3}
@@ -149,9 +151,8 @@ nodes:
 @pytest.mark.parametrize("real_time", [False, True])
 @pytest.mark.parametrize("target", ["/talker", "/ticker"])
 def test_services_of_other_nodes(tmp_path: Path, target: str, *, real_time: bool) -> None:
-    path = tmp_path / "operated.yaml"
-    path.write_text(OPERATED.replace("TARGET", target))
-    with SystemTest(path, real_time=real_time) as system:
+    text = OPERATED.replace("TARGET", target)
+    with open_system(tmp_path, text, real_time=real_time) as system:
         operator = instances(system)["operator"]
         system.run_until(lambda: len(operator.seen) == 9, 20.0)
         states = [True, "inactive", True, "active", False, "active"]
@@ -161,9 +162,7 @@ def test_services_of_other_nodes(tmp_path: Path, target: str, *, real_time: bool
 
 @pytest.mark.parametrize("real_time", [False, True])
 def test_faults_in_classes(tmp_path: Path, *, real_time: bool) -> None:
-    path = tmp_path / "demo.yaml"
-    path.write_text(DEMO)
-    with SystemTest(path, real_time=real_time) as system:
+    with open_system(tmp_path, DEMO, real_time=real_time) as system:
         nodes = instances(system)
 
         def is_logged(text: str) -> bool:
@@ -184,50 +183,37 @@ def test_faults_in_classes(tmp_path: Path, *, real_time: bool) -> None:
             system.transition("counter", "deactivate")
 
 
+SLOW = [
+    (2.5, "on_configure: TransitionTimeout: timed out after 2.5 s"),
+    (2.5, "constructor has not returned; it is at "),
+]
+UNSERVED = [
+    (2.0, "found: False at 1000000002000000000"),
+    (2.0, "client 'reader/set_parameters' waits without end: in virtual time, no node"),
+    (2.0, "subscription on /parameter_events receives nothing in virtual time"),
+]
+SPINNING = "node_classes.py:129 uses a thread, which virtual time does not control"
+
+
 @pytest.mark.parametrize(
     ("node", "lines"),
     [
-        (
-            f"{TIMED}:Unserved",
-            [
-                (2.0, "found: False at 1000000002000000000"),
-                (2.0, "client 'reader/set_parameters' waits without end: in virtual time, no node"),
-                (2.0, "subscription on /parameter_events receives nothing in virtual time"),
-            ],
-        ),
-        (
-            f"{TIMED}:WaitsForever",
-            [
-                (1.0, "waiting"),
-                (2.0, "waiting"),
-                (2.5, "on_configure: TransitionTimeout: timed out after 2.5 s"),
-                (2.5, "constructor has not returned; it is at "),
-            ],
-        ),
-        (
-            f"{REFUSED}:NeverReturns",
-            [
-                (2.5, "on_configure: TransitionTimeout: timed out after 2.5 s"),
-                (2.5, "constructor has not returned; it is at "),
-            ],
-        ),
+        (f"{TIMED}:Unserved", UNSERVED),
+        (f"{TIMED}:WaitsForever", [(1.0, "waiting"), (2.0, "waiting"), *SLOW]),
+        (f"{REFUSED}:NeverReturns", SLOW),
         (
             f"{REFUSED}:SpinsInConstructor",
             [(0.0, "on_configure refused the transition: the class")],
         ),
-        (
-            f"{CLASSES}:Spinner",
-            [(0.0, "node_classes.py:129 uses a thread, which virtual time does not control")],
-        ),
+        (f"{CLASSES}:Spinner", [(0.0, SPINNING)]),
     ],
 )
 def test_what_a_class_cannot_do_is_reported(
     tmp_path: Path, node: str, lines: list[tuple[float, str]]
 ) -> None:
-    path = tmp_path / "reported.yaml"
     limits = "{timeout_ms: 2500, on_failure: ignore}"
-    path.write_text(f'system: s\nnodes: {{a: {{class: "{node}", lifecycle: {limits}}}}}\n')
-    system = SystemTest(path)
+    text = f'system: s\nnodes: {{a: {{class: "{node}", lifecycle: {limits}}}}}\n'
+    system = open_system(tmp_path, text)
     with suppress(TestFailure), system:  # it may not come up
         system.advance(0.0)
     logged = [(line.time_s, line.text) for line in system.log]
@@ -239,10 +225,8 @@ def test_what_a_class_cannot_do_is_reported(
 
 @pytest.mark.parametrize("is_ros", ["true", "false"])
 def test_a_class_that_waits_busily_ends_the_run(tmp_path: Path, is_ros: str) -> None:
-    path = tmp_path / "busily.yaml"
     node = f'{{class: "{TIMED}:WaitsBusily", arguments: {{is_ros: {is_ros}}}}}'
-    path.write_text(f"system: s\nnodes: {{busily: {node}}}\n")
-    with SystemTest(path) as system:
+    with open_system(tmp_path, f"system: s\nnodes: {{busily: {node}}}\n") as system:
         system.advance(10.0)
     assert system.outcome is not None
     assert system.outcome.exit_code == 1
@@ -255,10 +239,8 @@ def test_a_class_that_waits_for_a_lock_ends_the_run(
     tmp_path: Path, in_callback: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(virtual_time, "LOOK_S", 0.01)
-    path = tmp_path / "locked.yaml"
     node = f'{{class: "{TIMED}:Locked", arguments: {{in_callback: {in_callback}}}}}'
-    path.write_text(f"system: s\nnodes: {{locked: {node}}}\n")
-    system = SystemTest(path)
+    system = open_system(tmp_path, f"system: s\nnodes: {{locked: {node}}}\n")
     with suppress(TestFailure), system:
         system.advance(10.0)
     assert system.outcome is not None
