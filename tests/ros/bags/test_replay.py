@@ -1,10 +1,11 @@
-"""Replay: into a system in virtual time, compared with a bag, and to the ROS graph."""
+"""Replay into a system in virtual time and to the ROS graph, and recording of the graph."""
 
 from __future__ import annotations
 
 import os
 import pty
 import select
+import signal
 import subprocess
 import sys
 import threading
@@ -12,21 +13,29 @@ import time
 from pathlib import Path
 
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.service_introspection import ServiceIntrospectionState
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from composer.bags.bag import BagError, BagMessage, BagTopic
 from composer.bags.comparing import Tolerances
 from composer.bags.editing import Selection
+from composer.bags.graph_recording import GraphRecording
 from composer.bags.reader import open_bag
+from composer.bags.recorder import Recorder
 from composer.bags.writer import BagWriter
+from composer.client.session import Deadline, Session
 from composer.model.qos import PRESETS
+from composer.runtime.clock.clock import COMPUTER
 from composer.testing.bag_replay import Replay, replay, without_nodes
 from composer.testing.system_run import load_system
+from tests.ros.bags.test_recording import calls_of_service, decoded_data
 from tests.ros.support.commands import compose, error, finished, output_of, start
 from tests.ros.support.forked import ForkedCommand
-from tests.ros.support.in_process import PATIENCE_S, Peer
+from tests.ros.support.in_process import PATIENCE_S, Peer, wait_until
 
 SYSTEMS = Path(__file__).parents[3] / "systems"
 PIPELINE = SYSTEMS / "pipeline.yaml"
@@ -195,3 +204,70 @@ def test_a_type_that_is_not_installed_is_named(tmp_path: Path) -> None:
     assert "interface 'missing_msgs/msg/Chat' is not installed" in error("replay", bag)
     with pytest.raises(BagError, match="has no node 'x'"):
         without_nodes(load_system(PIPELINE, {}, {}), ["x"])
+
+
+@pytest.fixture
+def publishing(peer: Peer) -> Node:
+    """Two publishers of one topic, one of them best effort, a latched topic, and a service."""
+    node = peer.node
+    latched = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    map_publisher = node.create_publisher(String, "/map", latched)
+    for number in range(3):
+        map_publisher.publish(String(data=f"map {number}"))
+    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    for name, profile in (("a", QoSProfile(depth=1)), ("b", weak)):
+        publisher = node.create_publisher(String, "/chatter", profile)
+        node.create_timer(0.02, lambda name=name, to=publisher: to.publish(String(data=name)))
+    service = node.create_service(Trigger, "/introspected", lambda _, response: response)
+    contents = ServiceIntrospectionState.CONTENTS
+    service.configure_introspection(node.get_clock(), QoSProfile(depth=10), contents)
+    client = node.create_client(Trigger, "/introspected")
+    node.create_timer(0.05, lambda: client.call_async(Trigger.Request()))
+    return node
+
+
+@pytest.mark.usefixtures("publishing")
+def test_the_graph_is_recorded(tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    patterns = ("--topics", "/map", "--topics", "/chat*", "--services", "/intro*")
+    process = start("record", "-o", str(folder), *patterns)
+    while True:  # what was written can be read at any time
+        try:
+            found = set(open_bag(folder).summary.counts)
+        except BagError:
+            found = set()
+        if found == {"/map", "/chatter", "/introspected/_service_event"} and process.poll() is None:
+            break
+        assert process.poll() is None
+    process.send_signal(signal.SIGTERM)
+    output, text = process.communicate(timeout=60.0)
+    assert process.returncode == 0, text
+    assert f" 0 dropped: {folder}\n" in output
+    assert decoded_data(folder, "/map") == ["map 0", "map 1", "map 2"]
+    assert set(decoded_data(folder, "/chatter")) == {"a", "b"}
+    bag = open_bag(folder)
+    assert {kind for kind, *_ in calls_of_service(bag, "/introspected")} == {1, 2}
+    topics = bag.summary.topics
+    assert [item.durability for item in topics["/map"].qos] == ["transient_local"]
+    assert {item.reliability for item in topics["/chatter"].qos} == {"reliable", "best_effort"}
+    assert topics["/map"].type_hash.startswith("RIHS01_")
+
+
+@pytest.mark.usefixtures("publishing")
+def test_the_number_of_topics_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("composer.bags.graph_recording.MAX_TOPICS", 1)
+    warnings: list[str] = []
+    writer = BagWriter(tmp_path / "bag")
+    with Session() as session, Recorder(writer, COMPUTER) as recorder:
+        recording = GraphRecording(session, recorder, lambda _: True, warnings.append)
+
+        def is_limited() -> bool:
+            session.spin_once(Deadline(0.1))
+            recording.update()
+            return bool(warnings)
+
+        wait_until(is_limited, "the limit")
+        recording.update()
+        assert recording.topics == 1
+        recording.close()
+    assert warnings == ["there are more than 1 topics: no further ones are recorded"]

@@ -7,6 +7,7 @@ from pathlib import Path
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int64, String
 
+from composer.runtime.supervision.events import Logged
 from tests.ros.support.in_process import Peer, running, wait_until
 
 SYSTEM = """
@@ -56,25 +57,49 @@ nodes:
     behavior: talkative:Talkative
     publishers:
       output: {type: std_msgs/msg/String, external: true}
+  talker:
+    behavior: talkative:Talker
+    publishers:
+      plain: {type: std_msgs/msg/Int64, topic: /a}
+      _hidden: {type: std_msgs/msg/Int64, topic: /b}
+      __entries: {type: std_msgs/msg/Int64, topic: /c}
+      class: {type: std_msgs/msg/Int64, topic: /d}
+      no identifier: {type: std_msgs/msg/Int64, topic: /e}
+      "": {type: std_msgs/msg/Int64, topic: /f}
+"""
+TALKATIVE_MODULE = """
+from composer.behavior import Behavior
+from std_msgs.msg import String
+
+class Talkative(Behavior):
+    def on_configure(self): self.say("configure")
+    def on_activate(self): self.say("activate")
+    def on_deactivate(self): self.say("deactivate")
+    def on_cleanup(self): self.say("cleanup")
+
+    def say(self, text):
+        self.publishers.output.publish(String(data=text))
+        self.publishers.output.publish(String(data=text))
+
+class Talker(dict):  # any class works
+    def on_activate(self):
+        for name in dir(self.publishers):
+            assert getattr(self.publishers, name) is self.publishers[name]
+            self.log.info(name)
+        try:
+            self.publishers.plan
+        except AttributeError as error:
+            self.log.info(str(error))
 """
 
 
-def test_a_node_publishes_in_transitions_but_not_while_inactive(tmp_path: Path, peer: Peer) -> None:
-    module = """
-    from composer.behavior import Behavior
-    from std_msgs.msg import String
-
-    class Talkative(Behavior):
-        def on_configure(self): self.say("configure")
-        def on_activate(self): self.say("activate")
-        def on_deactivate(self): self.say("deactivate")
-        def on_cleanup(self): self.say("cleanup")
-
-        def say(self, text):
-            self.publishers.output.publish(String(data=text))
-            self.publishers.output.publish(String(data=text))
-    """
-    with running(TALKATIVE, tmp_path, talkative=module) as system:
+def test_behaviors_have_ports_as_attributes_and_publish_in_transitions_but_not_while_inactive(
+    tmp_path: Path, peer: Peer
+) -> None:
+    with running(TALKATIVE, tmp_path, talkative=TALKATIVE_MODULE) as system:
+        names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
+        logged = [event.message for event in system.reported(Logged) if event.logger == "talker"]
+        assert logged == [*names, f"no publisher 'plan'; available: {', '.join(names)}"]
         assert peer.change("/talkative", "deactivate")
         received = peer.listen(String, "/output")
         system.wait_for_listener("talkative", "output")
@@ -91,35 +116,3 @@ def test_a_node_publishes_in_transitions_but_not_while_inactive(tmp_path: Path, 
         "publisher 'output' drops its messages: /talkative is configuring, not active",
         "publisher 'output' drops its messages: /talkative is cleaningup, not active",
     ]
-
-
-PORTS = """
-system: ports
-nodes:
-  talker:
-    behavior: talker:Talker
-    publishers:
-      plain: {type: std_msgs/msg/Int64, topic: /a}
-      _hidden: {type: std_msgs/msg/Int64, topic: /b}
-      __entries: {type: std_msgs/msg/Int64, topic: /c}
-      class: {type: std_msgs/msg/Int64, topic: /d}
-      no identifier: {type: std_msgs/msg/Int64, topic: /e}
-      "": {type: std_msgs/msg/Int64, topic: /f}
-"""
-PORTS_MODULE = """
-class Talker(dict):  # any class works
-    def on_activate(self):
-        for name in dir(self.publishers):
-            assert getattr(self.publishers, name) is self.publishers[name]
-            self.log.info(name)
-        try:
-            self.publishers.plan
-        except AttributeError as error:
-            self.log.info(str(error))
-"""
-
-
-def test_ports_are_attributes_of_a_behavior(tmp_path: Path) -> None:
-    with running(PORTS, tmp_path, talker=PORTS_MODULE) as system:
-        names = ["", "__entries", "_hidden", "class", "no identifier", "plain"]
-        assert system.log() == [*names, f"no publisher 'plan'; available: {', '.join(names)}"]
