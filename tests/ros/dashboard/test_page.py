@@ -76,7 +76,7 @@ def test_every_view_has_an_address_and_a_key(view: Page) -> None:
         view.wait_for_url(f"**/{name}")
         assert view.locator(f'#rail a[href="/{name}"]').get_attribute("aria-current") == "page"
     view.goto("/nodes?show=plan")
-    expect_text(view.locator("tbody tr"), "planner.*configure")
+    check_plan(view)
     view.go_back()
     view.wait_for_url(f"**/{VIEWS[-1]}")
     visit(view, "/timing")
@@ -90,7 +90,21 @@ def test_every_view_has_an_address_and_a_key(view: Page) -> None:
     expect_text(view.locator("tr[data-key='/sensor_data'] td"), "^best effort, volatile$")
 
 
-def test_a_node_is_deactivated_and_activated_by_click(view: Page) -> None:
+def check_plan(view: Page) -> None:
+    """Check that each step of the bring-up has the cause that ``compose run --dry-run`` prints."""
+    steps = output_of("run", REPOSITORY / FILE, "--dry-run").splitlines()
+    rows = view.locator("table[aria-label='Plan of the bring-up'] tbody tr")
+    rows.first.wait_for()
+    shown = []
+    for row in rows.all():
+        number, node, transition, why = row.locator("td, th").all_inner_texts()
+        cause, _, after = why.partition(" after step ")
+        order = "".join(f" after #{step}" for step in after.split(", ") if step)
+        shown.append(f"#{number} {transition} {node}{order}: {cause}")
+    assert shown == steps
+
+
+def test_a_node_and_the_system_are_changed_by_click(view: Page) -> None:
     view.goto(f"/nodes{PLANNER}")
     view.focus("button[data-transition=deactivate]")
     view.keyboard.press("Enter")
@@ -107,6 +121,23 @@ def test_a_node_is_deactivated_and_activated_by_click(view: Page) -> None:
     expect_text(view.locator(".activity"), "paused · 0 of 3 active")
     view.click("#bar [data-command=resume]")
     expect_text(view.locator(".activity"), "running · 3 of 3 active")
+    # The whole system is reset and started again.
+    activity, bar = view.locator(".activity"), view.locator("#bar")
+    view.click("#rail a[href='/nodes']")
+    bar.locator("[data-command=reset]").click()
+    expect_text(view.locator("dialog"), "All nodes are cleaned up")
+    view.click("dialog >> text=Cancel")
+    expect_text(activity, "running · 3 of 3 active")
+    bar.locator("[data-command=reset]").click()
+    view.click("dialog >> button:text-is('Reset')")
+    expect_text(activity, "^reset · 0 of 3 active")
+    expect_text(view.locator("tbody tr"), "planner.*unconfigured")
+    bar.locator("[data-command=startup]").wait_for()
+    expect_state(PLANNER, "unconfigured")
+    assert bar.locator("[data-command=pause]").count() == 0
+    bar.locator("[data-command=startup]").click()
+    expect_text(activity, "running · 3 of 3 active")
+    expect_state(PLANNER, "active")
 
 
 #: Each transition once, with the state that it leads to.
@@ -173,39 +204,6 @@ def test_nodes_are_restarted_by_click_also_after_a_shutdown(view: Page, peer: Pe
 def ends(event: TransitionEvent) -> bool:
     """Return whether a node is in a primary state then."""
     return bool(event.goal_state.id <= State.PRIMARY_STATE_FINALIZED)
-
-
-def test_the_system_is_reset_and_started_again_by_click(view: Page) -> None:
-    view.goto("/nodes")
-    activity, bar = view.locator(".activity"), view.locator("#bar")
-    bar.locator("[data-command=reset]").click()
-    expect_text(view.locator("dialog"), "All nodes are cleaned up")
-    view.click("dialog >> text=Cancel")
-    expect_text(activity, "running · 3 of 3 active")
-    bar.locator("[data-command=reset]").click()
-    view.click("dialog >> button:text-is('Reset')")
-    expect_text(activity, "^reset · 0 of 3 active")
-    expect_text(view.locator("tbody tr"), "planner.*unconfigured")
-    bar.locator("[data-command=startup]").wait_for()
-    expect_state(PLANNER, "unconfigured")
-    assert bar.locator("[data-command=pause]").count() == 0
-    bar.locator("[data-command=startup]").click()
-    expect_text(activity, "running · 3 of 3 active")
-    expect_state(PLANNER, "active")
-
-
-def test_the_plan_has_a_cause_for_each_step(view: Page) -> None:
-    steps = output_of("run", REPOSITORY / FILE, "--dry-run").splitlines()
-    view.goto("/nodes?show=plan")
-    rows = view.locator("table[aria-label='Plan of the bring-up'] tbody tr")
-    rows.first.wait_for()
-    shown = []
-    for row in rows.all():
-        number, node, transition, why = row.locator("td, th").all_inner_texts()
-        cause, _, after = why.partition(" after step ")
-        order = "".join(f" after #{step}" for step in after.split(", ") if step)
-        shown.append(f"#{number} {transition} {node}{order}: {cause}")
-    assert shown == steps
 
 
 def test_parameters_are_described_changed_and_refused(view: Page) -> None:

@@ -106,7 +106,7 @@ def test_a_message_with_lists_is_published(view: Page, peer: Peer) -> None:
     assert places == [(1.0, 0.0), (-3.25, 0.004)]
 
 
-def test_fields_are_filtered_and_what_is_not_shown_is_counted(view: Page) -> None:
+def test_fields_are_filtered_counted_and_plotted(view: Page) -> None:
     view.goto("/topics/sensor_data")
     shown = view.locator(".message .field:visible")
     shown.first.wait_for()
@@ -124,10 +124,8 @@ def test_fields_are_filtered_and_what_is_not_shown_is_counted(view: Page) -> Non
     view.locator("[data-path='header.frame_id']").wait_for()
     view.get_by_label("Messages per second shown").select_option("1 Hz")
     expect_text(view.locator(".echo .drops:visible"), r"^[1-9]\d not shown$")
-
-
-def test_fields_are_added_to_a_plot_with_the_keyboard(view: Page) -> None:
-    view.goto("/topics/sensor_data?tab=plot")
+    # Fields are added to a plot with the keyboard.
+    visit(view, "/topics/sensor_data?tab=plot")
     fields = view.get_by_label("Field to add")
     fields.locator("option[value='pose.pose.position.x']").wait_for(state="attached")
     fields.focus()
@@ -163,7 +161,7 @@ def test_images_are_shown(view: Page) -> None:
         expect_text(detail(view), r"1 . 1 png")
 
 
-def test_a_message_is_published_from_a_form(view: Page) -> None:
+def test_a_message_is_published_from_a_form_and_shown(view: Page, peer: Peer) -> None:
     view.goto("/topics/lab/in?tab=publish")
     view.get_by_label("data").fill("hello <b>you</b>")
     view.click("form >> text=Publish")
@@ -175,10 +173,8 @@ def test_a_message_is_published_from_a_form(view: Page) -> None:
     view.locator("form >> text=Repeat").wait_for()
     visit(view, "/topics/lab/received")
     expect_text(view.locator(".message"), "hello <b>you</b>")
-
-
-def test_only_what_is_on_the_screen_is_subscribed(view: Page, peer: Peer) -> None:
-    view.goto("/topics/lab/text")
+    # Only what is on the screen is subscribed.
+    visit(view, "/topics/lab/text")
     view.locator(".message [data-path=data] .value").wait_for()
     wait_until(lambda: peer.node.count_subscribers("/lab/text") > 0)
     view.click("#rail a[href='/log']")
