@@ -79,27 +79,21 @@ def test_topic_info() -> None:
     listed((kept,), "topic", "info", "-v", "/lab/text")
 
 
-def test_echo_receives_from_a_best_effort_publisher() -> None:
-    lines = listed(("data",), "topic", "echo", "/lab/count", "--count", "5", "--json").splitlines()
+def test_echo_receives_messages_of_all_kinds_and_filters_them() -> None:
+    count, text = ("topic", "echo", "/lab/count"), ("topic", "echo", "/lab/text", "--once")
+    # From a best-effort publisher.
+    lines = listed(("data",), *count, "--count", "5", "--json").splitlines()
     values = [json.loads(line)["data"] for line in lines]
     assert values == list(range(values[0], values[0] + 5))
-
-
-def test_echo_receives_earlier_messages_and_truncates_them() -> None:
-    echo = ("topic", "echo", "/lab/text", "--once")
-    text = yaml.safe_load(listed(("data",), *echo).removesuffix("---\n"))
-    assert text == {"data": "x" * 128 + "..."}
-    full = listed(("x",), *echo, "--full-length", "--field", "data")
+    # Earlier messages, truncated.
+    shown = yaml.safe_load(listed(("data",), *text).removesuffix("---\n"))
+    assert shown == {"data": "x" * 128 + "..."}
+    full = listed(("x",), *text, "--full-length", "--field", "data")
     assert full == "x" * 200 + "\n---\n"
-
-
-def test_echo_filters_by_an_expression() -> None:
     condition = "message.data > 20 and message.data < 1000000"
-    echo = ("topic", "echo", "/lab/count", "--once", "--field", "data")
-    value = listed(("---\n",), *echo, "--filter", condition)
+    value = listed(("---\n",), *count, "--once", "--field", "data", "--filter", condition)
     assert int(value.removesuffix("---\n")) > 20
-    wrong = ("topic", "echo", "/lab/count", "--filter", "message.data >")
-    done = repeated(lambda done: done.returncode == 2, *wrong)
+    done = repeated(lambda done: done.returncode == 2, *count, "--filter", "message.data >")
     assert done.stderr.startswith("compose: --filter: ")
 
 
@@ -167,23 +161,18 @@ def side_by_side(
     return values, seen_s, rate
 
 
-def test_hz_prints_text() -> None:
-    rate = "average rate: "
-    listed((rate,), "topic", "hz", "/lab/count", "--count", "10")
+def test_rates_are_measured_filtered_and_time_out() -> None:
+    rate = ("topic", "hz", "/lab/count")
+    listed(("average rate: ",), *rate, "--count", "10")
     too_few = "too few messages on '/lab/count' to measure them yet"
-    two = ("topic", "hz", "/lab/count", "--count", "2")
-    repeated(lambda done: too_few in done.stderr, *two)
-
-
-def test_measurements_can_be_filtered_and_time_out() -> None:
+    repeated(lambda done: too_few in done.stderr, *rate, "--count", "2")
     even = ("--filter", "message.data % 2 == 0", "--count", "20", "--json")
     expected = pytest.approx(25.0, rel=0.3)  # of 50 on a busy machine
-    rate = ("topic", "hz", "/lab/count", *even)
-    found = measured(lambda found: found["average_hz"] == expected, *rate)
+    found = measured(lambda found: found["average_hz"] == expected, *rate, *even)
     assert found["average_hz"] == expected
     # A reliable subscription receives nothing from a best-effort publisher. The limit also applies
     # to the discovery of the topic.
-    silent = ("topic", "hz", "/lab/count", "--qos-reliability", "reliable", "--timeout", "5")
+    silent = (*rate, "--qos-reliability", "reliable", "--timeout", "5")
     # Latched messages from before are not measured; a report would be printed after a second.
     latched = ("topic", "hz", "/lab/text", "--timeout", "5")
     none = "no message received on '/lab/{}' for 5 s"
