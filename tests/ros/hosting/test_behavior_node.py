@@ -17,6 +17,7 @@ nodes:
     lifecycle: {autostart: inactive}
     parameters: {gain: {type: double, default: 1.0}}
     publishers: {numbers: {type: std_msgs/msg/Int64, qos: command, external: true}}
+  own: {behavior: "user:Own"}
 """
 #: Like the listeners and broadcasters of tf2_ros, and the subscribers of message_filters.
 USER = """
@@ -48,12 +49,20 @@ class Library:
 class User:
     def on_configure(self):
         self.helper = Library(self.node)
+
+class Own:
+    def __init__(self):
+        self.node = "mine"  # an attribute of that name is kept
+
+    def on_activate(self):
+        self.log.info(self.node)
 """
 
 
 def test_what_a_library_creates_follows_the_lifecycle(tmp_path: Path, peer: Peer) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     with running(SYSTEM, tmp_path, user=USER) as system:
+        system.wait_for_log("mine")
         undeclared = [line for line in system.log() if "is not declared" in line]
         assert undeclared == [
             "publisher on /frames is not declared: it uses DDS (std_msgs/msg/String)",
@@ -83,17 +92,3 @@ def test_what_a_library_creates_follows_the_lifecycle(tmp_path: Path, peer: Peer
         assert again.node.get_parameter("gain").value == 2.0
         counted = system.summary("/user")
     assert counted.errors == 0
-
-
-def test_a_behavior_with_an_attribute_of_that_name_keeps_it(tmp_path: Path) -> None:
-    module = """
-    class User:
-        def __init__(self):
-            self.node = "mine"
-
-        def on_activate(self):
-            self.log.info(self.node)
-    """
-    text = "system: own\nnodes: {user: {behavior: 'user:User'}}"
-    with running(text, tmp_path, user=module) as system:
-        system.wait_for_log("mine")
