@@ -267,18 +267,22 @@ def test_what_cannot_be_recorded_is_named(bags: Path) -> None:
         run.stop()
 
 
-class _FullDisk:
-    """A sink that fails after some messages."""
+class _Disk:
+    """A sink that fails after some messages; a stalled one waits before it writes."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, fails_after: int = 10**6, *, is_stalled: bool = False) -> None:
         self.written: list[BagMessage] = []
-        self._count = count
+        self.goes_on = threading.Event()
+        self._fails_after = fails_after
+        if not is_stalled:
+            self.goes_on.set()
 
     def add_topic(self, topic: BagTopic) -> None:
         pass
 
     def write(self, message: BagMessage) -> None:
-        if len(self.written) == self._count:
+        assert self.goes_on.wait(PATIENCE_S)
+        if len(self.written) == self._fails_after:
             raise BagError("the disk is full")
         self.written.append(message)
 
@@ -290,7 +294,7 @@ class _FullDisk:
 
 
 def test_a_full_disk_does_not_stop_publishers() -> None:
-    sink = _FullDisk(10)
+    sink = _Disk(10)
     problems: list[str] = []
     recorder = Recorder(sink, COMPUTER, problems.append)
     source = recorder.source(BagTopic("/chat", "std_msgs/msg/String"))
@@ -304,7 +308,7 @@ def test_a_full_disk_does_not_stop_publishers() -> None:
 
 
 def test_drops_are_counted() -> None:
-    sink = _FullDisk(10**6)
+    sink = _Disk()
     recorder = Recorder(sink, COMPUTER)  # whose thread does not run yet
     source = recorder.source(BagTopic("/chat", "std_msgs/msg/String"))
     for number in range(10_100):
@@ -315,22 +319,10 @@ def test_drops_are_counted() -> None:
     assert len(sink.written) == 10_000
 
 
-class _StalledDisk(_FullDisk):
-    """A sink that waits before it writes."""
-
-    def __init__(self) -> None:
-        super().__init__(10**6)
-        self.goes_on = threading.Event()
-
-    def write(self, message: BagMessage) -> None:
-        assert self.goes_on.wait(PATIENCE_S)
-        super().write(message)
-
-
 def test_small_messages_that_wait_for_a_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Python needs far more memory for them than for their bytes."""
     monkeypatch.setattr("composer.bags.recorder.LARGEST_PENDING_BYTES", 1_000_000)
-    sink = _StalledDisk()
+    sink = _Disk(is_stalled=True)
     recorder = Recorder(sink, COMPUTER)
     source = recorder.source(BagTopic("/empty", "std_msgs/msg/Empty"))
     with recorder:
@@ -342,7 +334,7 @@ def test_small_messages_that_wait_for_a_disk(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_stalled_disk_delays_no_node_and_costs_limited_memory() -> None:
-    sink = _StalledDisk()
+    sink = _Disk(is_stalled=True)
     recorder = Recorder(sink, COMPUTER)
     source = recorder.source(BagTopic("/image", "sensor_msgs/msg/Image"))
     image = bytes(1_000_000)
