@@ -27,7 +27,7 @@ from composer.loading import load
 from composer.model.qos import QosProfile
 from composer.model.recording import Recording
 from composer.plan import bring_up, tear_down
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision.events import BroughtUp, Event

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from rclpy.serialization import serialize_message
 
 from composer.bags.bag import BagError, BagMessage, BagTopic
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 
 _SERIALIZE_PERIOD_S = 0.02
 _WRITE_PERIOD_S = 0.1

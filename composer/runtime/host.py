@@ -36,14 +36,14 @@ from composer.model import LogLevel, Node, System
 from composer.model.names import PROGRAM_LOGGER, join
 from composer.plan import Plan
 from composer.runtime.children.discovery_server import discovery_servers
-from composer.runtime.clock.randomness import use_seed
-from composer.runtime.clock.virtual import VirtualClock
+from composer.runtime.clock import VirtualClock
 from composer.runtime.executors.placement import (
     memory_excess,
     place_process,
     switch_threads_sooner,
 )
 from composer.runtime.host_options import HostOptions, TimeLimits
+from composer.runtime.intra_process.servers import use_seed
 from composer.runtime.manager.node import ManagerNode
 from composer.runtime.manager.publishing import ManagerContext
 from composer.runtime.middleware.dds_profiles import use_large_system_profile

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, Port, Process
 from composer.model.qos import QosProfile
-from composer.runtime.clock.clock import COMPUTER, Clock
+from composer.runtime.clock import COMPUTER, Clock
 
 R = TypeVar("R")
 

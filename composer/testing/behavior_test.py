@@ -24,7 +24,7 @@ from composer.behavior import Logger
 from composer.model import LogLevel, Port, PortKind
 from composer.model.geometry import Quaternion, Vector
 from composer.model.lifecycle import TRANSITIONS, available_transitions
-from composer.runtime.clock.virtual import START_NS, VirtualClock
+from composer.runtime.clock import START_NS, VirtualClock
 from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypedDict, TypeVar, cast
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, Port
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.intra_process.publisher import copy_of
 from composer.runtime.intra_process.time_limits import Receiver
 from composer.testing.tester import Tester

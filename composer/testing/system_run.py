@@ -16,8 +16,7 @@ from composer.behavior import GoalRejected
 from composer.model import System
 from composer.model.names import PROGRAM_LOGGER
 from composer.plan import bring_up, tear_down
-from composer.runtime.clock.clock import Clock
-from composer.runtime.clock.virtual import VirtualClock
+from composer.runtime.clock import Clock, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions

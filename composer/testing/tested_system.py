@@ -12,8 +12,7 @@ from typing import Any, Self, TypeVar
 from composer.bags.system_recording import SystemRecording
 from composer.model import LogLevel, PortKind, System
 from composer.model.recording import Recording
-from composer.runtime.clock.clock import COMPUTER, Clock
-from composer.runtime.clock.virtual import START_NS, VirtualClock
+from composer.runtime.clock import COMPUTER, START_NS, Clock, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.host_options import HostOptions
 from composer.runtime.node.managed_node import ManagedNode

@@ -239,7 +239,7 @@ def _run_server(discovery: Discovery) -> None:
     """Run the servers until a signal. Raises CommandError."""
     from composer.model import LogLevel
     from composer.runtime.children.discovery_server import discovery_servers
-    from composer.runtime.clock.clock import COMPUTER
+    from composer.runtime.clock import COMPUTER
     from composer.runtime.process import StartRefused
     from composer.runtime.process.signals import (
         READY,

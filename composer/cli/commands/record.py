@@ -160,7 +160,7 @@ def _record(
     from composer.bags.bag import BagError
     from composer.bags.graph_recording import GraphRecording
     from composer.bags.recorder import Recorder
-    from composer.runtime.clock.clock import COMPUTER
+    from composer.runtime.clock import COMPUTER
 
     say(f"recording in {writer.folder}; press Ctrl-C to stop")
     recorder = Recorder(writer, COMPUTER)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from composer.bags.system_recording import SystemRecording
     from composer.model import Process, System
     from composer.plan import Plan
-    from composer.runtime.clock.clock import Clock
+    from composer.runtime.clock import Clock
     from composer.runtime.host_options import HostOptions
 
 EPILOG = examples(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from composer.bags.system_recording import SystemRecording
     from composer.model import System
     from composer.plan import Plan
-    from composer.runtime.clock.clock import Clock
+    from composer.runtime.clock import Clock
     from composer.runtime.host_options import HostOptions
     from composer.runtime.supervision.events import Outcome
 
@@ -49,8 +49,7 @@ def run_clock(
     ``used`` says which options that need other processes are given. Raises UsageError for options
     that have no meaning together.
     """
-    from composer.runtime.clock.clock import COMPUTER
-    from composer.runtime.clock.virtual import VirtualClock
+    from composer.runtime.clock import COMPUTER, VirtualClock
 
     if time is Time.REAL:
         for option, is_given in {"--speed": speed, "--publish-clock": publish_clock}.items():

@@ -21,7 +21,7 @@ from composer.dashboard.context import Dashboard, Run
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, internal_error
 from composer.dashboard.protocol.outbox import Outbox, Update
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 _LOG = logging.getLogger(__name__)

@@ -15,7 +15,7 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node, Port, System
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.metrics.statistics import ChainStatistics
 
 _MAX_IN_TRANSIT = 256  # messages from one node to the next; beyond, the oldest are forgotten

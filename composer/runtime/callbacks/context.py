@@ -29,7 +29,7 @@ from composer.runtime.host_options import Instruments
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node_time.node_time import NodeTime
+from composer.runtime.node_time import NodeTime
 
 _NANOSECONDS = 1e9
 

@@ -19,7 +19,7 @@ from rclpy.node import Node
 
 from composer.model import SEVERITIES, LogLevel
 from composer.model.qos import Durability, QosProfile
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.stacks import is_internal

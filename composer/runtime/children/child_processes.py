@@ -22,7 +22,7 @@ from typing import Any
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.children import launcher
 from composer.runtime.children.output import OutputLines
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.futures import Future
 
 _READ_BYTES = 65_536

@@ -24,7 +24,7 @@ from typing import TextIO
 from composer.model import Discovery, LogLevel
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import Child, ChildProcesses, Command
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.middleware.environment import active_variables
 from composer.runtime.process import StartRefused
 from composer.runtime.process.computer import PortState, is_own_address, port_state, resolve

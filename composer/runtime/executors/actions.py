@@ -26,7 +26,7 @@ from rclpy.task import Future as RclpyFuture
 from unique_identifier_msgs.msg import UUID
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors import readiness
 from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.readiness import Handle, SetCallback, Signal

@@ -12,7 +12,7 @@ from math import floor, inf, isnan
 from threading import get_ident
 from typing import Any, Generic, TypeVar
 
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.futures import Future, done_event
 from composer.runtime.executors.stacks import format_stacks
 from composer.runtime.executors.tasks import Report, Task, name_of

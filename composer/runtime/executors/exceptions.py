@@ -14,7 +14,7 @@ from typing import Any
 
 from composer.model import LogLevel
 from composer.model.names import PROGRAM_LOGGER
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.stacks import calls_user_code, is_internal
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 

@@ -17,7 +17,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future as RclpyFuture
 
 from composer.model import ExecutorKind
-from composer.runtime.clock.clock import COMPUTER, Clock
+from composer.runtime.clock import COMPUTER, Clock
 from composer.runtime.executors.actions import ActionSource
 from composer.runtime.executors.readiness import EntitySource, SourceGroup
 from composer.runtime.executors.scheduler import Scheduler

@@ -20,8 +20,7 @@ import select
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from composer.runtime.clock.clock import Clock
-from composer.runtime.clock.virtual import VirtualClock, Wakeup
+from composer.runtime.clock import Clock, VirtualClock, Wakeup
 
 #: The file descriptors that are ready, as (file descriptor, event mask).
 Ready = Sequence[tuple[int, int]]

@@ -15,7 +15,7 @@ from functools import partial
 from math import inf
 
 from composer.model import ExecutorKind
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.base_loop import BUSY_S, YIELD_S, ScheduledCall, TimerQueue
 from composer.runtime.executors.poller import poller_for
 from composer.runtime.executors.readiness import EntitySource, SourceGroup

@@ -19,7 +19,7 @@ from contextlib import suppress
 from threading import get_ident
 
 from composer.model import ExecutorKind
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.base_loop import PAUSE_AFTER_FAULT_S, BaseLoop
 from composer.runtime.executors.poller import use_precise_wakeups
 from composer.runtime.executors.tasks import Report

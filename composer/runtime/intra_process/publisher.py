@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 

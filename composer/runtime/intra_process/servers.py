@@ -6,6 +6,8 @@ feedback and may cancel them. Only what the client itself receives bypasses DDS.
 
 from __future__ import annotations
 
+import random
+import uuid
 from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
@@ -16,7 +18,6 @@ from unique_identifier_msgs.msg import UUID
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Isolation, Port
-from composer.runtime.clock.randomness import new_id
 from composer.runtime.executors import actions
 from composer.runtime.executors.actions import GoalServer
 from composer.runtime.executors.futures import Future
@@ -190,9 +191,24 @@ class LocalGoal:
         return self.server.cancel(self)
 
 
+_IDS = random.Random()  # noqa: S311 - they identify, and protect nothing
+
+
+def use_seed(seed: int) -> None:
+    """Begin the sequence of ids, of :mod:`random` and of ``numpy.random`` that ``seed`` has.
+
+    Generators that user code has created, such as ``numpy.random.default_rng()``, have their own.
+    """
+    _IDS.seed(seed)
+    random.seed(seed)
+    import numpy as np  # noqa: PLC0415 - its random numbers are slow to load
+
+    np.random.seed(seed)
+
+
 def new_goal_id() -> UUID:
     """Return a random id of a goal."""
-    return UUID(uuid=list(new_id()))
+    return UUID(uuid=list(uuid.UUID(int=_IDS.getrandbits(128), version=4).bytes))
 
 
 def _itself(value: Any) -> Any:

@@ -16,7 +16,7 @@ from rclpy.publisher import Publisher
 
 from composer.model import Isolation, Port
 from composer.model.qos import Durability, QosProfile, incompatibilities
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.intra_process.match_flag import MATCHING, MatchListener
 from composer.runtime.intra_process.publisher import (
     GatedPublisher,

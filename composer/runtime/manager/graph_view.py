@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.publishing import ReportPublisher
 from composer.runtime.middleware.dds_participants import count_participants

@@ -31,8 +31,7 @@ from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
-from composer.runtime.node_time.node_time import NodeTime
-from composer.runtime.node_time.sim_time import SimTimeSource, publish_clock
+from composer.runtime.node_time import NodeTime, SimTimeSource, publish_clock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.requests import (

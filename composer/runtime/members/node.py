@@ -17,7 +17,7 @@ from composer.model.lifecycle import (
     last_transition,
 )
 from composer.plan import Condition
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import wait_for
 from composer.runtime.members.context import ProcessUnavailable

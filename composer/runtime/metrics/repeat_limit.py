@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 
 _MAX_SUBJECTS = 1000
 #: The subject of everything new while the limit knows too many subjects.

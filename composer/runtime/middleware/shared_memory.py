@@ -20,7 +20,7 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.middleware.dds_participants import ports_of_domain
 from composer.runtime.process import StartRefused
 

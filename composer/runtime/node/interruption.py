@@ -14,7 +14,7 @@ from types import FrameType
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.base_loop import end_wait
 from composer.runtime.executors.stacks import (
     INTERRUPTIBLE,

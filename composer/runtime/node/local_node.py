@@ -31,7 +31,7 @@ from composer.runtime.node.lifecycle import Lifecycle
 from composer.runtime.node.managed_node import ManagedNode, NodeListener, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
-from composer.runtime.node_time.node_time import NodeTime
+from composer.runtime.node_time import NodeTime
 from composer.runtime.ports import PortSet, RunningPort
 
 T = TypeVar("T")

@@ -9,7 +9,7 @@ import socket
 from enum import Enum
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 
 _REFUSED_WITHIN_S = 0.3
 

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.process import StartRefused
 
 #: The key of the reports of a process that the coordinating process of its system starts. Such a

@@ -19,7 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.process.instance_lock import socket_path
 from composer.runtime.protocol.codec import ProtocolError, decode, encode
 

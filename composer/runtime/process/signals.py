@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from composer.runtime.clock.clock import Clock
-from composer.runtime.clock.virtual import VirtualClock, Wakeup
+from composer.runtime.clock import Clock, VirtualClock, Wakeup
 from composer.runtime.process.watchdog import STOP_SIGNALS
 
 _MILLISECONDS = 1000

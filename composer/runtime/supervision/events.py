@@ -11,7 +11,7 @@ from typing import Concatenate, ParamSpec, TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
 

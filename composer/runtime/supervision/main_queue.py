@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, TypeAlias, TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.model import System
 from composer.plan import DesiredState, Fault
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.process.signals import wakeup_for
 from composer.runtime.process.watchdog import SAME_REQUEST_S
 from composer.runtime.supervision.events import Reporter

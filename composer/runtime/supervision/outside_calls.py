@@ -19,7 +19,7 @@ from rclpy.clock_type import ClockType
 from rclpy.time import Time
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.stacks import is_internal, is_library, outward
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import Instance

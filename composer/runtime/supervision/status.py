@@ -12,7 +12,7 @@ from typing import Any
 from composer.model import Node, PrimaryState, System
 from composer.model.dependencies import in_dependency_order, needed_states
 from composer.plan import optional_nodes, start_goals
-from composer.runtime.clock.clock import COMPUTER, Clock
+from composer.runtime.clock import COMPUTER, Clock
 from composer.runtime.metrics.figures import CountedRate
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import ManagedNode

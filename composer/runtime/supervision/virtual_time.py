@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from composer.model import Node, System
-from composer.runtime.clock.clock import COMPUTER
-from composer.runtime.clock.virtual import VirtualClock
+from composer.runtime.clock import COMPUTER, VirtualClock
 from composer.runtime.executors.stacks import is_library, location_of, outward
 from composer.runtime.intra_process.router import shared_channels
 from composer.runtime.node.interruption import RunningCallback, running_callbacks

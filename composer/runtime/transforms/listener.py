@@ -17,12 +17,12 @@ from rclpy.time import Time
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.repeat_limit import RepeatLimit
-from composer.runtime.node_time.sim_time import SimTimeSource
+from composer.runtime.node_time import SimTimeSource
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.transforms.buffer import TransformBuffer

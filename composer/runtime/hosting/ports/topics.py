@@ -14,7 +14,7 @@ from rclpy.subscription import Subscription
 
 from composer.model import Port, PortKind
 from composer.model.qos import Durability
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.sources import Taken
 from composer.runtime.hosting.declared_ports import OF_EVERY_NODE

@@ -1,23 +1,113 @@
-"""Virtual time: a clock that jumps to the next point in time whenever nothing is left to do.
+"""The clock: whatever reads or waits for time in a running system asks it.
 
-The threads of a system take turns: one runs, the others wait in a method of the clock. A thread
-that begins to wait passes the turn on: to the one that has waited longest of those whose wait has
-ended, or else, after a jump of the time, to the one whose wait ends first. So there is one order of
+The host owns the clock of its system and passes it to the loops, the main queue and the status;
+everything else asks the one of its loop or queue. Only this module imports :mod:`time`.
+
+Virtual time is a clock that jumps to the next point in time whenever nothing is left to do. The
+threads of a system take turns: one runs, the others wait in a method of the clock. A thread that
+begins to wait passes the turn on: to the one that has waited longest of those whose wait has ended,
+or else, after a jump of the time, to the one whose wait ends first. So there is one order of
 everything that happens, whatever the computer does meanwhile, and no thread waits for real time.
 """
 
 from __future__ import annotations
 
 import threading
+import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import inf
 from queue import SimpleQueue
 from threading import current_thread, get_ident, main_thread
 from typing import Final, TypeVar
 
-from composer.runtime.clock.clock import COMPUTER, Clock
-
 T = TypeVar("T")
+
+
+class Clock(ABC):
+    """The time of a system, and waits for it. Any thread may call the methods."""
+
+    #: Whether it jumps, instead of waiting, when nothing is left to do.
+    is_virtual = False
+    #: Whether its system has no contact to other processes.
+    is_isolated = False
+    #: Whether calls that are due in the same nanosecond are due at the same time: the messages in a
+    #: bag have whole nanoseconds, so that a replay repeats their order.
+    has_ticks = False
+
+    @abstractmethod
+    def monotonic(self) -> float:
+        """Return a time in seconds that nothing adjusts; only differences have a meaning."""
+
+    @abstractmethod
+    def time_ns(self) -> int:
+        """Return the nanoseconds since 1970: the time of stamps."""
+
+    @abstractmethod
+    def sleep(self, delay_s: float, /) -> None:
+        """Block the calling thread for ``delay_s`` seconds."""
+
+    @abstractmethod
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
+        """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
+
+    @abstractmethod
+    def get(self, queue: SimpleQueue[T], /) -> T:
+        """Wait for an item of a queue, and remove and return it."""
+
+    @abstractmethod
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread of the system."""
+
+    @abstractmethod
+    def join(self, thread: threading.Thread, timeout_s: float | None = None) -> None:
+        """Wait for the end of a thread, at most ``timeout_s`` seconds."""
+
+    def time(self) -> float:
+        """Return the seconds since 1970."""
+        return self.time_ns() / 1e9
+
+
+class RealClock(Clock):
+    """The time of the computer."""
+
+    # The functions themselves: a loop reads the clock several times per message.
+    monotonic = staticmethod(time.monotonic)
+    time_ns = staticmethod(time.time_ns)
+    sleep = staticmethod(time.sleep)
+
+    def wait(self, event: threading.Event, timeout_s: float | None = None) -> bool:
+        """Block until ``event`` is set; return false if that takes longer than ``timeout_s``."""
+        return event.wait(timeout_s)
+
+    def get(self, queue: SimpleQueue[T], /) -> T:
+        """Wait for an item of a queue, and remove and return it."""
+        return queue.get()
+
+    def start(self, thread: threading.Thread) -> None:
+        """Start a thread of the system."""
+        thread.start()
+
+    def join(self, thread: threading.Thread, timeout_s: float | None = None) -> None:
+        """Wait for the end of a thread, at most ``timeout_s`` seconds."""
+        thread.join(timeout_s)
+
+    def cpu_s(self, thread: int) -> float:
+        """Return the CPU time that a thread has used, by its identifier; zero if it has ended."""
+        try:
+            return time.clock_gettime(time.pthread_getcpuclockid(thread))
+        except OSError:
+            return 0.0
+
+    def since_boot_s(self) -> float:
+        """Return the seconds since the computer has started, including suspends."""
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+#: For what has the time of the computer even if a system has another one: files, other programs,
+#: sockets and the middleware.
+COMPUTER: Final = RealClock()
+
 
 #: Virtual time begins in September 2001: not at zero, which means in ROS that no time is known.
 START_NS: Final = 10**18

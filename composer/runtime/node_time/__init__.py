@@ -1,1 +1,0 @@
-"""The time of a node: system time, steady time, or simulated time from /clock."""
