@@ -17,7 +17,7 @@ from composer.model import Node, PrimaryState
 from composer.model.dependencies import dependency_edges
 from composer.model.lifecycle import FINALIZED
 from composer.plan import Fault
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision.main_queue import Item, MainQueue, NodeReturned, StepEnded

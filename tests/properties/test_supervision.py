@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from composer.model import PrimaryState
 from composer.model.dependencies import dependency_edges
 from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Reporter
 from composer.runtime.supervision.main_queue import Command, NodeEvent, SupervisionContext

@@ -16,7 +16,7 @@ from composer.bags.bag import Bag, BagError, BagMessage, BagTopic
 from composer.bags.comparing import decoded
 from composer.bags.reader import open_bag
 from composer.bags.recorder import Recorder
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from tests.ros.support.commands import compose, error, finished, output_of, running
 from tests.ros.support.forked import ForkedCommand
 from tests.ros.support.in_process import PATIENCE_S, wait_until

@@ -14,7 +14,7 @@ from std_msgs.msg import Int64
 
 from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.user_code import UserCode
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.strand import ExclusiveStrand
 from composer.runtime.host_options import HostOptions
 from composer.runtime.metrics.statistics import CallbackStatistics

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from composer.model import PrimaryState
 from composer.plan import bring_up, tear_down
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
 from composer.runtime.manager import other_instances

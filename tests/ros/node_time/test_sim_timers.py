@@ -9,7 +9,7 @@ from functools import partial
 
 import pytest
 
-from composer.runtime.node_time.sim_time import NANOSECONDS, SimTimers
+from composer.runtime.node_time import NANOSECONDS, SimTimers
 
 
 class Loop:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import pytest
 
-from composer.runtime.clock.virtual import START_NS, VirtualClock, Wakeup
+from composer.runtime.clock import START_NS, VirtualClock, Wakeup
 
 Happened = list[tuple[float, str]]
 

@@ -10,7 +10,7 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors import poller as module
 from composer.runtime.executors.poller import Poller
 

@@ -8,7 +8,7 @@ from time import monotonic
 
 import pytest
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.base_loop import ScheduledCall, TimerQueue
 
 

@@ -13,7 +13,7 @@ from typing import cast
 
 import pytest
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.futures import Future
 from composer.runtime.intra_process.lifecycle_gate import PendingFutures

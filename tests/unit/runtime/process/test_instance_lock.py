@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.process import StartRefused, instance_lock
 from composer.runtime.process.instance_lock import (
     hold_instance_lock,

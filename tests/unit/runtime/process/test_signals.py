@@ -20,7 +20,7 @@ while os.read(0, 1):
 """
 RECEIVER = f"""
 import os, random, subprocess, sys, time
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.supervision.main_queue import MainQueue
 from composer.runtime.process.signals import stop_signals
 

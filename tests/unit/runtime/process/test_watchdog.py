@@ -34,7 +34,7 @@ library.usleep(2_000_000)
 """
 PROGRAM = """
 import ctypes, os, sys, threading, time
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.process.signals import WakeupSocket, stop_signals
 from composer.runtime.process.watchdog import signal_watchdog
 

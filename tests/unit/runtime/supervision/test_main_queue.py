@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.runtime.supervision import main_queue as module
 from composer.runtime.supervision.main_queue import MainQueue
 
