@@ -18,7 +18,7 @@ from composer.client.messages.topics import wait_until_acknowledged
 from composer.client.messages.values import InvalidValueError, class_of
 from composer.client.session import Deadline, Session
 from composer.model.qos import QosProfile, strongest
-from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros.conversions import rclpy_profile
 
 #: As of Gazebo and rosbag2.
 _CLOCK_PERIOD_S = 0.01

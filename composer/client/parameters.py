@@ -21,7 +21,7 @@ from composer.client.systems.node_services import NodeServices
 from composer.language.tree import Plain
 from composer.model.names import is_hidden
 from composer.runtime.protocol.requests import ParameterDescription
-from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value
+from composer.runtime.ros.conversions import NOT_SET, description, plain_value
 
 T = TypeVar("T")
 

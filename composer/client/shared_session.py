@@ -16,8 +16,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.client.messages.values import class_of
 from composer.client.session import Deadline, Session
 from composer.model.qos import QosProfile
-from composer.runtime.ros.qos_profiles import rclpy_profile
-from composer.runtime.ros_graph.changes import GraphChanges
+from composer.runtime.ros.conversions import rclpy_profile
+from composer.runtime.ros_graph.graph import GraphChanges
 
 InvalidHandle = rclpy_implementation.InvalidHandle
 _WAIT_S = 0.02

@@ -19,7 +19,7 @@ from composer.model.qos import incompatibilities
 from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
 from composer.runtime.middleware.environment import ROS_ARGUMENTS
 from composer.runtime.ros.messages import MessageError, interface_class
-from composer.runtime.ros_graph.endpoints import EndpointInfo, TopicInfo
+from composer.runtime.ros_graph.endpoints import EndpointInfo, TopicInfo, topic_info
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
 #: Fast DDS repeats the announcement of a participant every 3 s.
@@ -96,7 +96,7 @@ def check_graph(session: Session, deadline: Deadline) -> Iterator[CheckResult]:
             "start one ('compose run pipeline') in a terminal with the same ROS_DOMAIN_ID",
         )
         return
-    topics = [session.graph.topic(*named) for named in names.names("topic")]
+    topics = [topic_info(session.graph.node, *named) for named in names.names("topic")]
     services = names.names("service")
     problems = [
         *check_node_names(nodes),

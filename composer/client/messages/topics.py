@@ -23,7 +23,8 @@ from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.shared_session import Sample, SampledTopic
 from composer.model.qos import Durability, QosProfile, strictest_compatible
 from composer.runtime.metrics.figures import MessageRate
-from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros.conversions import rclpy_profile
+from composer.runtime.ros_graph.endpoints import topic_info
 
 SUBSCRIPTION_DEPTH = 1000
 #: Messages that a command takes at once: they may be large.
@@ -80,7 +81,7 @@ class TopicSubscription(SampledTopic):
 
 def offered_profiles(session: Session, topic: str) -> list[QosProfile]:
     """Return the QoS profiles of the publishers of a topic, by its full name."""
-    return [publisher.qos for publisher in session.graph.topic(topic, ()).publishers]
+    return [publisher.qos for publisher in topic_info(session.graph.node, topic, ()).publishers]
 
 
 def measuring_qos(offers: list[QosProfile], depth: int) -> QosProfile:

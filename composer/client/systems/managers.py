@@ -34,7 +34,7 @@ from composer.runtime.protocol.requests import (
     Restart,
     SaveRecording,
 )
-from composer.runtime.ros.manager_interface import (
+from composer.runtime.ros.service_requests import (
     CALLBACKS_QOS,
     STATE_QOS,
     RequestService,

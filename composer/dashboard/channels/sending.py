@@ -42,7 +42,7 @@ class Outgoing:
         """Create the publisher. Raises RosError, RequestError."""
         from composer.client.graph_names import full_name
         from composer.client.messages.values import build_message, class_of
-        from composer.runtime.ros.qos_profiles import rclpy_profile
+        from composer.runtime.ros.conversions import rclpy_profile
 
         self._ros = ros
         message_class = class_of(self.type_name)

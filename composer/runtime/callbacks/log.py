@@ -26,7 +26,7 @@ from composer.runtime.executors.stacks import is_internal
 from composer.runtime.host_options import Recorder
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.ros.qos_profiles import rclpy_profile
+from composer.runtime.ros.conversions import rclpy_profile
 
 #: As rcl_qos_profile_rosout_default: a late joiner gets the last ten seconds.
 _ROSOUT_QOS = QosProfile(depth=1000, durability=Durability.TRANSIENT_LOCAL, lifespan_ms=10_000.0)

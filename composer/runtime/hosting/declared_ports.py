@@ -13,7 +13,7 @@ from composer.model import ChannelKind, Isolation, Node, Port, PortKind, Qos
 from composer.model.names import expand_name, free_name
 from composer.model.qos import PRESETS, QosProfile
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.ros.qos_profiles import own_profile
+from composer.runtime.ros.conversions import own_profile
 
 
 class HostingError(TransitionFailed):

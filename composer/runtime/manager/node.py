@@ -47,13 +47,14 @@ from composer.runtime.protocol.requests import (
     Restart,
     SaveRecording,
 )
-from composer.runtime.ros.limited_requests import limit_type_descriptions, limited
-from composer.runtime.ros.manager_interface import (
+from composer.runtime.ros.service_requests import (
     RequestService,
     answer_message,
+    limit_type_descriptions,
+    limited,
     read_request,
 )
-from composer.runtime.ros_graph.changes import GraphChanges
+from composer.runtime.ros_graph.graph import GraphChanges
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.transforms.listener import TransformListeners
 

@@ -41,7 +41,7 @@ from composer.runtime.protocol.reports import (
     signed,
 )
 from composer.runtime.protocol.requests import CALLBACKS_TOPIC, STATE_TOPIC, Instance
-from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS
+from composer.runtime.ros.service_requests import CALLBACKS_QOS, STATE_QOS
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.supervision.status import Status
 

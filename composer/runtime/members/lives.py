@@ -24,7 +24,7 @@ from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held, report
 from composer.runtime.protocol.codec import ProtocolError, decode
 from composer.runtime.protocol.reports import NodeReport, SystemReport, is_signed, split_signature
 from composer.runtime.protocol.requests import NAME, STATE_TOPIC
-from composer.runtime.ros.manager_interface import STATE_QOS
+from composer.runtime.ros.service_requests import STATE_QOS
 
 #: Processes report every second. One that has not reported for this time is lost.
 REPORTS_WITHIN_S = 5.0

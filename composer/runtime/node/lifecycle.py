@@ -37,7 +37,7 @@ from composer.runtime.executors.tasks import within
 from composer.runtime.intra_process.taps import transition_tap
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import ManagedLifecycle, TransitionOutcome
-from composer.runtime.ros.limited_requests import TooLarge, limited
+from composer.runtime.ros.service_requests import TooLarge, limited
 
 if TYPE_CHECKING:
     from composer.runtime.node.local_node import LocalNode

@@ -18,7 +18,7 @@ from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.host_options import Instruments, Recorder, Tap
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.node_time import SimTimeSource
-from composer.runtime.ros.limited_requests import limit_type_descriptions
+from composer.runtime.ros.service_requests import limit_type_descriptions
 from composer.runtime.transforms.listener import TransformListeners
 
 

@@ -2,7 +2,7 @@
 
 They respond as rclpy's do, except that a large request does not keep the node's loop from its other
 callbacks: it is handled in slices, or refused above the limits of
-:mod:`composer.runtime.ros.limited_requests`. A value of an unknown type is refused with a reason.
+:mod:`composer.runtime.ros.service_requests`. A value of an unknown type is refused with a reason.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from composer.runtime.clock import Clock
 from composer.runtime.executors.exceptions import text_of
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.protocol.requests import ParameterDescription
-from composer.runtime.ros.limited_requests import MAX_ITEMS, TooLarge, limited
-from composer.runtime.ros.parameter_values import description
+from composer.runtime.ros.conversions import description
+from composer.runtime.ros.service_requests import MAX_ITEMS, TooLarge, limited
 
 T = TypeVar("T")
 

@@ -16,8 +16,8 @@ from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.ports.client import CallingPort, CallLimit
+from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
-from composer.runtime.ros.qos_profiles import rclpy_profile
 
 OnFeedback = Callable[[Any], Any]
 

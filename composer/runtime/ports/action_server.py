@@ -21,8 +21,8 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.servers import LocalActionServer
 from composer.runtime.intra_process.taps import GoalTap
 from composer.runtime.ports.goals import GoalExecutor, Handlers
+from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import Build, compile_message, interface_class
-from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
 class RunningGoal:

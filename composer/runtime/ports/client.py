@@ -17,8 +17,8 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
 from composer.runtime.ports import RunningPort
+from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
-from composer.runtime.ros.qos_profiles import rclpy_profile
 
 T = TypeVar("T")
 

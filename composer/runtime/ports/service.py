@@ -14,8 +14,8 @@ from composer.runtime.executors.sources import unused_callback
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
 from composer.runtime.ports.serving import Handler, RequestServer
+from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
-from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
 class ServicePort(RequestServer):

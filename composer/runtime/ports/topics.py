@@ -20,8 +20,8 @@ from composer.runtime.intra_process.topic import LatchedMessages
 from composer.runtime.ports import RunningPort
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
 from composer.runtime.ports.qos_events import QosEvents
+from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
-from composer.runtime.ros.qos_profiles import rclpy_profile
 
 
 class PublisherPort(RunningPort):

@@ -19,7 +19,7 @@ NAME = "manager"
 IS_ACTIVE = "is_active"
 #: At the end of ``startup`` and ``resume``: undo everything if a node fails.
 ALL_OR_NOTHING = "_all_or_nothing"
-#: Carries documents: see :mod:`composer.runtime.ros.manager_interface`.
+#: Carries documents: see :mod:`composer.runtime.ros.service_requests`.
 REQUEST = "request"
 #: A hidden service of each manager, with a unique name: see ``manager/other_instances.py``.
 INSTANCE_PREFIX = "_instance_"
@@ -72,7 +72,7 @@ class NodesQuery:
 
 @dataclass(frozen=True, slots=True)
 class DetailsAnswer:
-    """A node, topic or action with its endpoints, as ``ros_graph/node_endpoints.py`` has them."""
+    """A node, topic or action with its endpoints, as ``ros_graph/endpoints.py`` has them."""
 
     details: Mapping[str, Any]
 

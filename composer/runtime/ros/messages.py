@@ -7,6 +7,7 @@ is converted, except that a number for a Time or a Duration means seconds.
 
 from __future__ import annotations
 
+import sys
 import threading
 from array import array
 from collections.abc import Callable, Mapping
@@ -32,7 +33,19 @@ from composer.base.diagnostics import suggestion
 from composer.interfaces.parser import split_name
 from composer.interfaces.sources import installed_prefixes
 from composer.language.templates import Computed, Constant, Items, Record, Template, Text, evaluate
-from composer.runtime.ros.type_support import UnsupportedTypeSupport
+
+# Every message class imports rosidl_generator_py, which also imports its generator, with a parser
+# and a template engine: 50 ms of CPU time. The package leaves out a generator that cannot be
+# imported, as is the case where only what programs need at run time is installed. This has to run
+# before the first type support is loaded. See docs/decisions/0014-start-up.md.
+_GENERATOR = "rosidl_generator_py.generate_py_impl"
+_is_hidden = _GENERATOR not in sys.modules
+if _is_hidden:
+    sys.modules[_GENERATOR] = None  # type: ignore[assignment]  # importlib: it cannot be imported
+from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport  # noqa: E402
+
+if _is_hidden:
+    del sys.modules[_GENERATOR]
 
 Scope: TypeAlias = Mapping[str, Any]
 Build: TypeAlias = Callable[[Scope], Any]
@@ -124,7 +137,13 @@ def compile_message(template: Template, message_type: Any, what: str) -> Build:
     for errors that do not depend on the scope. The function raises MessageError and
     EvaluationError.
     """
-    return _message(template, message_type, what)
+    match template:
+        case Record():
+            return _record(template, message_type, what)
+        case Computed():
+            return _computed(template, _message_converter(message_type, what))
+        case _:
+            raise MessageError(f"{what}: {_type_name(message_type)} is made of a map of fields")
 
 
 def convert_message(values: Mapping[str, Any], message_type: Any, what: str) -> Any:
@@ -132,7 +151,13 @@ def convert_message(values: Mapping[str, Any], message_type: Any, what: str) -> 
 
     Nothing is evaluated: a string is a string.
     """
-    return _from_mapping(values, message_type, what)
+    types = _field_types(message_type)
+    message = message_type()
+    for name, content in values.items():
+        if name not in types:
+            raise _no_field(what, message_type, name)
+        setattr(message, name, _converter(types[name], _field_path(what, name))(content))
+    return message
 
 
 def to_plain(value: Any) -> Any:
@@ -146,16 +171,6 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [to_plain(item) for item in value]
     return value
-
-
-def _message(template: Template, message_type: Any, where: str) -> Build:
-    match template:
-        case Record():
-            return _record(template, message_type, where)
-        case Computed():
-            return _computed(template, _message_converter(message_type, where))
-        case _:
-            raise MessageError(f"{where}: {_type_name(message_type)} is made of a map of fields")
 
 
 def _record(template: Record, message_type: Any, where: str) -> Build:
@@ -293,22 +308,12 @@ def _message_converter(message_type: Any, where: str) -> Convert:
         if isinstance(value, message_type):
             return value
         if isinstance(value, Mapping):
-            return _from_mapping(value, message_type, where)
+            return convert_message(value, message_type, where)
         if name in _SECONDS_TYPES and isinstance(value, (int, float)):
             return _from_seconds(value, message_type, where)
         raise MessageError(f"{where} takes a {name}, not {_format(value)}")
 
     return convert_value
-
-
-def _from_mapping(value: Mapping[str, Any], message_type: Any, where: str) -> Any:
-    types = _field_types(message_type)
-    message = message_type()
-    for name, content in value.items():
-        if name not in types:
-            raise _no_field(where, message_type, name)
-        setattr(message, name, _converter(types[name], _field_path(where, name))(content))
-    return message
 
 
 def _from_seconds(value: float, message_type: Any, where: str) -> Any:

@@ -7,6 +7,8 @@ queries, and a single participant would keep every command from working.
 
 from __future__ import annotations
 
+import ctypes
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Set
 from functools import lru_cache
@@ -26,12 +28,6 @@ from composer.model import ChannelKind, PortKind
 from composer.model.names import join_node_name
 from composer.runtime.middleware.dds_participants import ended_participants
 from composer.runtime.protocol.requests import NameAndTypes
-from composer.runtime.ros_graph.endpoints import (
-    PARTICIPANT_BYTES,
-    UNKNOWN_NODE,
-    TopicInfo,
-    topic_info,
-)
 
 #: The name and the namespace of a node.
 NodeName: TypeAlias = tuple[str, str]
@@ -41,6 +37,10 @@ COMMAND_PREFIX = "_compose_"
 #: The endpoints of a participant arrive 0.1 to 0.2 s after the participant itself; lost
 #: announcements are repeated 0.11 s later. Fast DDS 2 defines these times in EDPUtils.hpp.
 SETTLE_S = 0.15
+#: rmw's node name of an endpoint whose participant has not reported its nodes yet.
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: The length of the participant's prefix in the id of an endpoint (DDSI-RTPS, 9.3.1).
+PARTICIPANT_BYTES = 12
 #: The topic with which each ROS 2 participant announces its nodes, by its DDS name.
 _PARTICIPANTS_TOPIC = "ros_discovery_info"
 _KNOWN_NAMES = 50_000  # of the largest systems, several times
@@ -86,7 +86,7 @@ class RosGraph:
     """Queries of the ROS graph as ``node`` has discovered it so far; ``skipped`` was left out."""
 
     def __init__(self, node: Node) -> None:
-        self._node = node
+        self.node = node
         self.skipped = Skipped()
 
     def names(self, kind: str) -> tuple[NameAndTypes, ...]:
@@ -117,7 +117,7 @@ class RosGraph:
 
         Publishers and subscriptions are announced separately; a participant counts with both.
         """
-        node, topic = self._node, _PARTICIPANTS_TOPIC
+        node, topic = self.node, _PARTICIPANTS_TOPIC
         publishers = node.get_publishers_info_by_topic(topic, no_mangle=True)
         subscriptions = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
         return frozenset(map(participant, publishers)) & frozenset(map(participant, subscriptions))
@@ -127,7 +127,7 @@ class RosGraph:
 
         One that was killed before never does.
         """
-        node = self._node
+        node = self.node
         known = node.get_publishers_info_by_topic(_PARTICIPANTS_TOPIC, no_mangle=True)
         named, nameless = set[bytes](), set[bytes]()
         for topic, _ in self.topics():
@@ -157,7 +157,7 @@ class RosGraph:
     def _ended(self, others: Set[bytes] = frozenset()) -> frozenset[bytes]:
         """Return which participants have ended; ``others`` have announced only a part."""
         known = self.participants() | others
-        return ended_participants(known, self._node.context.get_domain_id())
+        return ended_participants(known, self.node.context.get_domain_id())
 
     def _all_nodes(self) -> list[NodeName]:
         """Return the nodes of all participants that DDS knows.
@@ -166,7 +166,7 @@ class RosGraph:
         has no enclave for them: a participant announces its enclave itself.
         """
         try:
-            listed = self._node.get_node_names_and_namespaces_with_enclaves()
+            listed = self.node.get_node_names_and_namespaces_with_enclaves()
             found = [(name, namespace) for name, namespace, enclave in listed if enclave]
         except rclpy_implementation.RCLError:  # a node without a name, so rcl returns none at all
             self.skipped.add(_INVALID, "node ''")
@@ -181,31 +181,27 @@ class RosGraph:
 
     def topics(self) -> list[NameAndTypes]:
         """Return all topics."""
-        return self._valid("topic", self._node.get_topic_names_and_types())
+        return self._valid("topic", self.node.get_topic_names_and_types())
 
     def services(self) -> list[NameAndTypes]:
         """Return all services."""
-        return self._valid("service", self._node.get_service_names_and_types())
+        return self._valid("service", self.node.get_service_names_and_types())
 
     def actions(self) -> list[NameAndTypes]:
         """Return all actions."""
-        return self._valid("action", _actions().get_action_names_and_types(self._node))
+        return self._valid("action", _actions().get_action_names_and_types(self.node))
 
     def ends_of(self, node: NodeName, kind: PortKind) -> list[NameAndTypes]:
         """Return the topics, services or actions of which a node has endpoints of a kind."""
         query = f"get_{_QUERIES[kind]}_names_and_types_by_node"
         try:
             if kind.channel is ChannelKind.ACTION:
-                found = getattr(_actions(), query)(self._node, *node)
+                found = getattr(_actions(), query)(self.node, *node)
             else:
-                found = getattr(self._node, query)(*node)
+                found = getattr(self.node, query)(*node)
             return self._valid(kind.channel.value, found)
         except _REFUSED:
             return []
-
-    def topic(self, name: str, types: tuple[str, ...]) -> TopicInfo:
-        """Return the endpoints of a topic by its full, valid name."""
-        return topic_info(self._node, name, types)
 
     def _valid(self, kind: str, found: Iterable[tuple[str, list[str]]]) -> list[NameAndTypes]:
         return [
@@ -233,8 +229,8 @@ class RosGraph:
     def _all_ends(self) -> Iterator[TopicEndpointInfo]:
         """Yield the publishers and subscriptions of all nodes."""
         for topic, _ in self.topics():
-            yield from self._node.get_publishers_info_by_topic(topic)
-            yield from self._node.get_subscriptions_info_by_topic(topic)
+            yield from self.node.get_publishers_info_by_topic(topic)
+            yield from self.node.get_subscriptions_info_by_topic(topic)
 
 
 # A service is a pair of DDS topics: its server reads requests, its clients write them.
@@ -280,3 +276,40 @@ def _listed(found: list[str]) -> str:
 def _actions() -> ModuleType:
     """Import the queries of actions late: they import numpy, which most commands do not need."""
     return import_module("rclpy.action.graph")
+
+
+# What rclpy lacks. rclpy has loaded librcl of the ROS installation in use.
+_RCL = ctypes.CDLL("librcl.so")
+_guard_condition_of = _RCL.rcl_node_get_graph_guard_condition
+_guard_condition_of.argtypes = [ctypes.c_void_p]
+_guard_condition_of.restype = ctypes.c_void_p
+_add_guard_condition = _RCL.rcl_wait_set_add_guard_condition
+_add_guard_condition.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.POINTER(ctypes.c_size_t)]
+_add_guard_condition.restype = ctypes.c_int
+
+
+class GraphChanges:
+    """Counts the changes of the ROS graph, for rare queries of any thread.
+
+    rcl triggers a guard condition at each change. A context can have only one of these: each call
+    resets that condition.
+    """
+
+    def __init__(self, node: Node) -> None:
+        #: The node whose view of the graph it is.
+        self.node = node
+        self._wait_set = rclpy_implementation.WaitSet(0, 1, 0, 0, 0, 0, node.context.handle)
+        self._number = 0
+        self._looking = threading.Lock()
+
+    def number(self) -> int:
+        """Return another number than the last time if the graph may have changed since then."""
+        with self._looking, self.node.handle:
+            self._wait_set.clear_entities()
+            index = ctypes.c_size_t()
+            condition = _guard_condition_of(self.node.handle.pointer)
+            refusal = _add_guard_condition(self._wait_set.pointer, condition, ctypes.byref(index))
+            self._wait_set.wait(0)
+            if refusal or self._wait_set.is_ready("guard_condition", index.value):
+                self._number += 1
+            return self._number

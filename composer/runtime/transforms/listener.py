@@ -23,8 +23,8 @@ from composer.runtime.executors.sources import Taken
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node_time import SimTimeSource
+from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
-from composer.runtime.ros.qos_profiles import rclpy_profile
 from composer.runtime.transforms.buffer import TransformBuffer
 from composer.runtime.transforms.messages import nanoseconds, transform_of
 

@@ -1,4 +1,4 @@
-"""Converts QoS profiles to and from rclpy's."""
+"""QoS profiles to and from rclpy's, and values and descriptors of parameters to plain data."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from dataclasses import replace
 from enum import Enum
 from typing import Any, TypeVar
 
+from rcl_interfaces.msg import ParameterDescriptor, ParameterValue
 from rclpy.duration import Duration
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -15,7 +18,9 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
+from composer.model import ParameterType
 from composer.model.qos import Durability, History, Liveliness, QosProfile, Reliability
+from composer.runtime.protocol.requests import ParameterDescription
 
 P = TypeVar("P", bound=Enum)
 
@@ -77,3 +82,32 @@ def _duration(milliseconds: float | None) -> Duration:
 def _milliseconds(duration: Any) -> float | None:
     milliseconds = duration.nanoseconds / _NANOSECONDS
     return None if milliseconds >= _NO_LIMIT_MS else milliseconds
+
+
+NOT_SET = "not set"
+_TYPES = {RosParameter.Type.NOT_SET.value: NOT_SET} | {
+    RosParameter.Type[kind.name].value: kind.value for kind in ParameterType
+}
+
+
+def plain_value(value: ParameterValue) -> Any:
+    """Return the value as plain data; byte strings become numbers, unknown types None."""
+    found = parameter_value_to_python(value) if value.type in _TYPES else None
+    if isinstance(found, list):
+        return [item[0] if isinstance(item, bytes) else item for item in found]
+    return found
+
+
+def description(name: str, found: ParameterDescriptor) -> ParameterDescription:
+    """Return the description of the parameter ``name``."""
+    bounds = [*found.floating_point_range, *found.integer_range]
+    return ParameterDescription(
+        name=name,
+        type=_TYPES.get(found.type, f"unknown type {found.type}"),
+        description=found.description,
+        constraints=found.additional_constraints,
+        read_only=found.read_only,
+        minimum=bounds[0].from_value if bounds else None,
+        maximum=bounds[0].to_value if bounds else None,
+        step=(bounds[0].step or None) if bounds else None,
+    )

@@ -1,4 +1,4 @@
-"""Service types whose requests are limited before they become Python objects.
+"""Requests to services: limited before they become Python objects, and documents as requests.
 
 rclpy converts a whole request while it holds the interpreter's lock: 50 000 parameters take two
 seconds, in which no node of the process runs. Here the size of the request is read from the C
@@ -7,6 +7,11 @@ large is not converted.
 
 rclpy finds the conversion in an attribute of the metaclass of the request; the types here have
 another one. This is rosidl_generator_py's interface, and the layout of its C structures.
+
+A document of the protocol is a text, and so is the answer. Of the service types in every ROS
+installation, SetParametersAtomically is the one that takes any text and returns another, with a
+reason if there is none; a type of our own would have to be compiled by every user. Its only
+parameter is ``request``.
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ from functools import cache, partial
 from typing import Any
 
 from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetLoggerLevels,
@@ -28,10 +34,12 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.type_support import check_is_valid_srv_type
 from type_description_interfaces.srv import GetTypeDescription
 
 from composer.base.fast_dataclass import dataclass
+from composer.runtime.protocol.codec import ProtocolError, decode, encode
 
 #: Names in one request; a response with so many values takes a few milliseconds.
 MAX_NAMES = 10_000
@@ -178,3 +186,46 @@ def _respond(callback: Any, request: Any, response: Any) -> Any:
     response.successful = False
     response.failure_reason = request.reason
     return response
+
+
+#: Carries documents of the protocol.
+RequestService = SetParametersAtomically
+
+#: Transient local: a late joiner gets the last message at once.
+STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+CALLBACKS_QOS = QoSProfile(depth=10)
+
+_PARAMETER = "request"
+
+
+def request_message(request: Any) -> SetParametersAtomically.Request:
+    """Return the message with a request of :mod:`composer.runtime.protocol.requests`."""
+    kind = ParameterType.PARAMETER_STRING
+    value = ParameterValue(type=kind, string_value=encode(request))
+    return RequestService.Request(parameters=[Parameter(name=_PARAMETER, value=value)])
+
+
+def read_request(message: Any, *kinds: type[Any]) -> Any:
+    """Return the request of one of the types ``kinds`` in a message. Raises ProtocolError."""
+    if isinstance(message, TooLarge):
+        raise ProtocolError(message.reason)
+    texts = [item.value.string_value for item in message.parameters if item.name == _PARAMETER]
+    if len(texts) != 1:
+        raise ProtocolError(f"expected one parameter '{_PARAMETER}' with a document as its value")
+    return decode(texts[0], *kinds, limit=MAX_ITEMS)
+
+
+def answer_message(answer: Any) -> SetParametersAtomically.Response:
+    """Return the message with an answer; with the reason for a ProtocolError."""
+    is_error = isinstance(answer, ProtocolError)
+    reason = str(answer) if is_error else encode(answer)
+    return RequestService.Response(
+        result=SetParametersResult(successful=not is_error, reason=reason)
+    )
+
+
+def read_answer(message: SetParametersAtomically.Response, request: Any) -> Any:
+    """Return the answer to a request in a message. Raises ProtocolError."""
+    if not message.result.successful:
+        raise ProtocolError(message.result.reason)
+    return decode(message.result.reason, request.Answer)
