@@ -17,8 +17,8 @@ from composer.client.session import Deadline, Session
 from composer.client.snapshot import GraphObserver
 from composer.plan.drift import ObservedNode
 from composer.runtime.protocol.requests import CallNodes, NodeCall
-from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
 from composer.runtime.ros.messages import to_plain
+from composer.runtime.ros.service_requests import RequestService, read_answer, request_message
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
 LEAN = """

@@ -24,7 +24,7 @@ from composer.runtime.process.instance_lock import (
     is_held,
     local_systems,
 )
-from composer.runtime.ros.manager_interface import STATE_QOS
+from composer.runtime.ros.service_requests import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
 from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, members, split, states
 from tests.ros.support.commands import code_of_end

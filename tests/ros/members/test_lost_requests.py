@@ -19,7 +19,7 @@ from composer.runtime.manager.publishing import ReportTimes
 from composer.runtime.protocol.codec import ProtocolError, decode, encode
 from composer.runtime.protocol.reports import SystemReport, split_signature
 from composer.runtime.protocol.requests import ChangeStates, Step, StepResult
-from composer.runtime.ros.manager_interface import (
+from composer.runtime.ros.service_requests import (
     STATE_QOS,
     RequestService,
     read_answer,

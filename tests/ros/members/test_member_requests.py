@@ -27,7 +27,7 @@ from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import ChangeStates, StepResult, StepResults
-from composer.runtime.ros.manager_interface import (
+from composer.runtime.ros.service_requests import (
     STATE_QOS,
     RequestService,
     answer_message,

@@ -22,7 +22,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from type_description_interfaces.srv import GetTypeDescription
 
-from composer.runtime.ros import limited_requests
+from composer.runtime.ros import service_requests
 from composer.runtime.supervision.events import Logged
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
@@ -189,7 +189,7 @@ def test_the_layout_of_requests_is_known(peer: Peer) -> None:
         requests.append(request)
         return response
 
-    service = limited_requests.limited(SetParameters)
+    service = service_requests.limited(SetParameters)
     peer.node.create_service(service, "/laid_out", respond)
     values = {
         "string_value": "abc", "byte_array_value": [b"1"] * 5, "bool_array_value": [True] * 7,
@@ -200,7 +200,7 @@ def test_the_layout_of_requests_is_known(peer: Peer) -> None:
     request = SetParameters.Request(parameters=changes)
     checked: list[int] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(limited_requests, "excess_of", lambda *given: checked.append(given[0]))
+        patch.setattr(service_requests, "excess_of", lambda *given: checked.append(given[0]))
         peer.call(SetParameters, "/laid_out", request)
     assert checked == [2, 3 + 5 + 7 + 11 + 13 + 17 + 19]
     assert requests[0] == request

@@ -16,7 +16,7 @@ import pytest
 from benchmarks.processes import run_program
 from benchmarks.soak import after_fifths
 from composer.runtime.protocol.requests import REQUEST, Restart
-from composer.runtime.ros.manager_interface import RequestService, read_answer, request_message
+from composer.runtime.ros.service_requests import RequestService, read_answer, request_message
 from tests.ros.support.in_process import Peer
 from tests.ros.support.system_process import PATIENCE_S, RunningSystem, write_system
 
