@@ -19,7 +19,7 @@ from benchmarks.programs.payloads import CLASSES, make
 from benchmarks.programs.task import places, task_from_arguments
 from benchmarks.programs.work import COUNTS, measure, needs_kick, print_result
 from composer.runtime.executors.readiness import MESSAGE, Signal
-from composer.runtime.middleware.dds_profiles import use_discovery_profile
+from composer.runtime.middleware.environment import use_discovery_profile
 
 
 def pass_on(subscription: Subscription, publisher: Publisher) -> None:

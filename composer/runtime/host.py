@@ -37,24 +37,24 @@ from composer.model.names import PROGRAM_LOGGER, join
 from composer.plan import Plan
 from composer.runtime.children.discovery_server import discovery_servers
 from composer.runtime.clock import VirtualClock
-from composer.runtime.executors.placement import (
-    memory_excess,
-    place_process,
-    switch_threads_sooner,
-)
 from composer.runtime.host_options import HostOptions, TimeLimits
 from composer.runtime.intra_process.servers import use_seed
 from composer.runtime.manager.node import ManagerNode
 from composer.runtime.manager.publishing import ManagerContext
-from composer.runtime.middleware.dds_profiles import use_large_system_profile
 from composer.runtime.middleware.environment import (
     ROS_ARGUMENTS,
     active_variables,
     prepare_environment,
+    use_large_system_profile,
 )
 from composer.runtime.node.managed_node import ManagedNode, NodeListener
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
+from composer.runtime.process.computer import (
+    memory_excess,
+    place_process,
+    switch_threads_sooner,
+)
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
 from composer.runtime.process.signals import WakeupSocket, stop_signals
 from composer.runtime.process.watchdog import signal_watchdog

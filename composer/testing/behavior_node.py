@@ -9,8 +9,8 @@ from typing import Any, cast
 from composer.behavior import BehaviorError, TransitionFailed
 from composer.model import TF_TYPE, BehaviorReference, Node, Port, PortKind
 from composer.model.lifecycle import ACTIVE, FINALIZED, INACTIVE, TRANSITIONS, UNCONFIGURED
-from composer.runtime.executors.exceptions import describe, is_closing, shown, text_of
 from composer.runtime.executors.tasks import within
+from composer.runtime.executors.tracebacks import describe, is_closing, shown, text_of
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.node.behavior_loader import (
     NodeClock,

@@ -25,9 +25,9 @@ from composer.model import LogLevel, Port, PortKind
 from composer.model.geometry import Quaternion, Vector
 from composer.model.lifecycle import TRANSITIONS, available_transitions
 from composer.runtime.clock import START_NS, VirtualClock
-from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import describe
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.ports.goals import Handlers
 from composer.testing.behavior_context import TestContext, VirtualLoop

@@ -91,7 +91,7 @@ def _check_all(system: System | None, timeout: float) -> Iterator[CheckResult]:
     )
     from composer.client.doctor.network import check_declared_discovery, check_network
     from composer.runtime.middleware.environment import complete_environment, use_discovery
-    from composer.runtime.middleware.shared_memory import SHARED_MEMORY
+    from composer.runtime.middleware.local_resources import SHARED_MEMORY
 
     yield from check_versions()
     if system is not None and system.discovery is not None:

@@ -16,7 +16,7 @@ from composer.base.characters import counted
 from composer.client.doctor import CheckResult, error, note, ok, warning
 from composer.model import Discovery, DiscoveryKind
 from composer.runtime.middleware.environment import discovery_conflict
-from composer.runtime.middleware.shared_memory import (
+from composer.runtime.middleware.local_resources import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,
     MIN_FREE_BYTES,

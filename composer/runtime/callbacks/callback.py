@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from weakref import ref
 
 from composer.base.source import Located
-from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import Work, in_steps
+from composer.runtime.executors.tracebacks import calls_user_code
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import BATCH_SIZE, CallbackStatistics
 

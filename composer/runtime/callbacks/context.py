@@ -20,10 +20,9 @@ from composer.runtime.callbacks.chains import NodeChains
 from composer.runtime.callbacks.log import ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MutationCheck
 from composer.runtime.callbacks.user_code import UserCode
-from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.sources import Reply
+from composer.runtime.executors.sources import EventCounts, Reply
 from composer.runtime.executors.strand import Strand
 from composer.runtime.host_options import Instruments
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate

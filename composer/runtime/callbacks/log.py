@@ -20,9 +20,8 @@ from rclpy.node import Node
 from composer.model import SEVERITIES, LogLevel
 from composer.model.qos import Durability, QosProfile
 from composer.runtime.clock import Clock
-from composer.runtime.executors.exceptions import describe, printable, report_of
 from composer.runtime.executors.futures import Cancelled
-from composer.runtime.executors.stacks import is_internal
+from composer.runtime.executors.tracebacks import describe, is_internal, printable, report_of
 from composer.runtime.host_options import Recorder
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.metrics.statistics import Statistics

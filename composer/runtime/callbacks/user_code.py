@@ -6,11 +6,10 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
 from composer.behavior import CallCancelled, Logger
-from composer.runtime.executors.exceptions import is_closing, text_of
 from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import OuterCoroutine, Strand
 from composer.runtime.executors.tasks import SupportsCallLater
+from composer.runtime.executors.tracebacks import calls_user_code, is_closing, text_of
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.metrics.statistics import Statistics
 

@@ -14,8 +14,8 @@ from typing import Any, Generic, TypeVar
 
 from composer.runtime.clock import Clock
 from composer.runtime.executors.futures import Future, done_event
-from composer.runtime.executors.stacks import format_stacks
 from composer.runtime.executors.tasks import Report, Task, name_of
+from composer.runtime.executors.tracebacks import format_stacks
 
 _SWEEP_SIZE = 64  # entries at which canceled calls are removed
 

@@ -14,7 +14,7 @@ from types import FrameType
 from typing import Any, Protocol, TypeVar
 
 from composer.runtime.executors.futures import Future, awaited_rclpy_future, wrap_future
-from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.tracebacks import calls_user_code
 from composer.runtime.executors.turns import TurnTaking
 
 T = TypeVar("T")

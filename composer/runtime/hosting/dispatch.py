@@ -22,7 +22,7 @@ from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.node import Node
 
 from composer.model import PortKind
-from composer.runtime.executors.stacks import is_internal
+from composer.runtime.executors.tracebacks import is_internal
 from composer.runtime.hosting import adopted_node
 from composer.runtime.hosting.adopted_node import AdoptedLifecycleNode, AdoptedNode
 from composer.runtime.hosting.declared_ports import HostingError

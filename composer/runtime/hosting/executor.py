@@ -10,8 +10,8 @@ from rclpy.task import Future as RclpyFuture
 
 from composer.runtime.executors.futures import Awaited
 from composer.runtime.executors.loop import NodeExecutor
-from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import name_of
+from composer.runtime.executors.tracebacks import calls_user_code
 from composer.runtime.hosting.user_code import UserFunction
 
 if TYPE_CHECKING:

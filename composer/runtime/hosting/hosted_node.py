@@ -22,8 +22,8 @@ from composer.model.interface_packages import how_to_get
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
+from composer.runtime.executors.tracebacks import calls_user_code
 from composer.runtime.hosting.adopted_node import adopted, is_managed
 from composer.runtime.hosting.declared_ports import (
     DeclaredPorts,

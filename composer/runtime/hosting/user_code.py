@@ -13,14 +13,14 @@ from rclpy.callback_groups import CallbackGroup
 from composer.behavior import CallCancelled
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.stacks import (
+from composer.runtime.executors.strand import in_steps, scope_of
+from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import (
     calls_user_code,
     gc_paused,
     location_of,
     stacks_of,
 )
-from composer.runtime.executors.strand import in_steps, scope_of
-from composer.runtime.executors.tasks import sleep
 from composer.runtime.node.interruption import RunningCallback, running_callbacks
 
 if TYPE_CHECKING:

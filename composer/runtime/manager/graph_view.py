@@ -13,7 +13,7 @@ from typing import Any
 from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.publishing import ReportPublisher
-from composer.runtime.middleware.dds_participants import count_participants
+from composer.runtime.middleware.local_resources import count_participants
 from composer.runtime.node.parameter_services import ParameterServices, count_items
 from composer.runtime.process.query_socket import Answer
 from composer.runtime.protocol.reports import SystemReport

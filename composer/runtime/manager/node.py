@@ -20,10 +20,9 @@ from rclpy.time_source import USE_SIM_TIME_NAME
 from std_srvs.srv import Trigger
 
 from composer.runtime.callbacks.log import Log
-from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.sources import Reply, unused_callback
+from composer.runtime.executors.sources import EventCounts, Reply, unused_callback
+from composer.runtime.executors.tracebacks import exception_log
 from composer.runtime.manager.graph_view import GraphObserver, ManagerQueries
 from composer.runtime.manager.member_service import MemberService, answer_calls
 from composer.runtime.manager.other_instances import OtherInstances

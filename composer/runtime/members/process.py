@@ -19,9 +19,9 @@ from composer.model import Process
 from composer.model.lifecycle import ACTIVE, FINALIZED, INACTIVE, PRIMARY_STATES
 from composer.runtime.children.child_processes import Child, StartFailed
 from composer.runtime.children.output import attribute_line, process_loggers
-from composer.runtime.executors.exceptions import printable
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import printable
 from composer.runtime.members.context import MemberContext, ProcessUnavailable
 from composer.runtime.members.lives import (
     REPORTS_WITHIN_S,

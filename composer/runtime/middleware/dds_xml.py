@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from composer.model import Discovery
-from composer.runtime.middleware.dds_profiles import (
+from composer.runtime.middleware.environment import (
     PROFILES_VARIABLE,
     RANGE_VARIABLE,
     TRANSPORTS_VARIABLE,
@@ -23,7 +23,7 @@ from composer.runtime.middleware.dds_profiles import (
     is_own_profile,
     save_profile,
 )
-from composer.runtime.middleware.shared_memory import (
+from composer.runtime.middleware.local_resources import (
     LARGE_SEGMENT_BYTES,
     MEGABYTE,
     MIN_FREE_BYTES,

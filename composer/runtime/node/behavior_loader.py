@@ -25,10 +25,9 @@ from typing import TYPE_CHECKING, Any
 
 from composer.behavior import CallCancelled
 from composer.model import BehaviorReference
-from composer.runtime.executors.exceptions import BEHAVIOR_PACKAGE
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.stacks import calls_user_code, interruptible
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import BEHAVIOR_PACKAGE, calls_user_code, interruptible
 
 if TYPE_CHECKING:
     from composer.runtime.callbacks.context import NodeContext

@@ -16,7 +16,7 @@ from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.base_loop import end_wait
-from composer.runtime.executors.stacks import (
+from composer.runtime.executors.tracebacks import (
     INTERRUPTIBLE,
     USER_CODE_CALLERS,
     format_stack,

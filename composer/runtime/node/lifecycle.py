@@ -24,16 +24,16 @@ from rclpy.type_support import check_is_valid_srv_type
 from composer.behavior import TransitionFailed
 from composer.model.lifecycle import TRANSITIONS
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.exceptions import (
+from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.sources import Reply, unused_callback
+from composer.runtime.executors.tasks import within
+from composer.runtime.executors.tracebacks import (
     describe,
     internal_report_of,
     is_closing,
     report_of,
     text_of,
 )
-from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.sources import Reply, unused_callback
-from composer.runtime.executors.tasks import within
 from composer.runtime.intra_process.taps import transition_tap
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.node.managed_node import ManagedLifecycle, TransitionOutcome

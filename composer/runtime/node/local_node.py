@@ -21,10 +21,10 @@ from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
-from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import rclpy_callback
 from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
+from composer.runtime.executors.tracebacks import describe
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle

@@ -14,9 +14,8 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from composer.behavior import TransitionFailed
 from composer.model import BehaviorReference, Event, Node, PeriodError
-from composer.runtime.executors.exceptions import shown
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.tracebacks import calls_user_code, shown
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import (
     NodeClock,

@@ -14,7 +14,7 @@ from composer.model import Node
 from composer.model.qos import QosProfile
 from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
-from composer.runtime.executors.event_counts import EventCounts
+from composer.runtime.executors.sources import EventCounts
 from composer.runtime.host_options import Instruments, Recorder, Tap
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.node_time import SimTimeSource

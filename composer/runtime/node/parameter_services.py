@@ -36,7 +36,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 
 from composer.runtime.clock import Clock
-from composer.runtime.executors.exceptions import text_of
+from composer.runtime.executors.tracebacks import text_of
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 from composer.runtime.protocol.requests import ParameterDescription
 from composer.runtime.ros.conversions import description

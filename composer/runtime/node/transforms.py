@@ -24,7 +24,7 @@ from composer.model.geometry import IDENTITY
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.executors.futures import Future
-from composer.runtime.executors.stacks import interruptible
+from composer.runtime.executors.tracebacks import interruptible
 from composer.runtime.ports import RunningPort
 from composer.runtime.ports.topics import PublisherPort
 from composer.runtime.ros.messages import interface_class

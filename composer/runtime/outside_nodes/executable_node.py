@@ -15,7 +15,7 @@ from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
 from composer.runtime.children.output import attribute_line
-from composer.runtime.executors.exceptions import printable
+from composer.runtime.executors.tracebacks import printable
 from composer.runtime.outside_nodes.outside_node import (
     OutsideContext,
     TransitionRefused,

@@ -20,10 +20,10 @@ from composer.model.lifecycle import (
 from composer.model.names import split_node_name
 from composer.runtime.callbacks.log import logger_name
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import describe
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import (
     ManagedLifecycle,

@@ -17,7 +17,7 @@ from composer.model.names import join_node_name, split_node_name
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep, wait_for
-from composer.runtime.middleware.dds_participants import is_in_group
+from composer.runtime.middleware.local_resources import is_in_group
 from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.

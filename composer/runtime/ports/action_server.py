@@ -15,9 +15,9 @@ from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import RunningReaction
 from composer.runtime.executors.actions import GoalServer
-from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import describe
 from composer.runtime.intra_process.servers import LocalActionServer
 from composer.runtime.intra_process.taps import GoalTap
 from composer.runtime.ports.goals import GoalExecutor, Handlers

@@ -11,9 +11,9 @@ from composer.model import Event, Port
 from composer.runtime.callbacks.callback import CallbackTimer
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import RunningReaction
-from composer.runtime.executors.exceptions import text_of
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tracebacks import text_of
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
 from composer.runtime.ports import RunningPort

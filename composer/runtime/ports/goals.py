@@ -11,10 +11,9 @@ from composer.behavior import CallCancelled, Goal
 from composer.model import Port
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.user_code import UserCode
-from composer.runtime.executors.exceptions import is_closing, shown, text_of
 from composer.runtime.executors.futures import Cancelled, Future
-from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import wait_for
+from composer.runtime.executors.tracebacks import calls_user_code, is_closing, shown, text_of
 from composer.runtime.ports import RunningPort
 
 

@@ -138,7 +138,7 @@ class QosEvents:
     """The ``event_callbacks`` of one port, from which rclpy creates event handlers.
 
     It creates none. Incompatible endpoints, deadlines and the port's own liveliness are counted
-    (``event_counts``). For lost messages and the liveliness of other endpoints the status is taken,
+    (``EventCounts``). For lost messages and the liveliness of other endpoints the status is taken,
     which has their number and distinguishes a loss from a recovery. Matches are not watched here:
     in-process delivery does (``MatchListener``), and rmw has one callback per kind of event.
 

@@ -9,9 +9,8 @@ from composer.behavior import CallError, ServerUnavailable
 from composer.model import Port
 from composer.runtime.callbacks.queue import queue_for
 from composer.runtime.callbacks.user_code import UserCode
-from composer.runtime.executors.exceptions import describe, is_closing, shown
 from composer.runtime.executors.futures import Cancelled
-from composer.runtime.executors.stacks import calls_user_code
+from composer.runtime.executors.tracebacks import calls_user_code, describe, is_closing, shown
 from composer.runtime.ports import RunningPort
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from rclpy.validate_node_name import validate_node_name
 
 from composer.model import ChannelKind, PortKind
 from composer.model.names import join_node_name
-from composer.runtime.middleware.dds_participants import ended_participants
+from composer.runtime.middleware.local_resources import ended_participants
 from composer.runtime.protocol.requests import NameAndTypes
 
 #: The name and the namespace of a node.

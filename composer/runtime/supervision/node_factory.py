@@ -21,8 +21,8 @@ from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.log import Write, set_level
 from composer.runtime.callbacks.mutation_check import MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.executors.exceptions import exception_log
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.tracebacks import exception_log
 from composer.runtime.host_options import HostOptions
 from composer.runtime.hosting.behavior_node import NodeOfBehavior
 from composer.runtime.hosting.hosted_node import HostedNode

@@ -10,9 +10,8 @@ from composer.model import (
     System,
 )
 from composer.model.lifecycle import FINALIZED
-from composer.runtime.executors.exceptions import describe
 from composer.runtime.executors.futures import Future, done_event
-from composer.runtime.executors.placement import place_threads
+from composer.runtime.executors.tracebacks import describe
 from composer.runtime.executors.turns import TurnWatch
 from composer.runtime.members.node import MemberNode
 from composer.runtime.metrics.figures import chain_figures, figures
@@ -20,6 +19,7 @@ from composer.runtime.node.interruption import RunningCallback, running_callback
 from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.node.parameters import ParameterError
+from composer.runtime.process.computer import place_threads
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 from composer.runtime.supervision.events import COUNTERS, NodeSummary
 from composer.runtime.supervision.node_factory import NodeFactory

@@ -20,7 +20,7 @@ from rclpy.time import Time
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock import Clock
-from composer.runtime.executors.stacks import is_internal, is_library, outward
+from composer.runtime.executors.tracebacks import is_internal, is_library, outward
 from composer.runtime.hosting.dispatch import install
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.user_code import current_instance

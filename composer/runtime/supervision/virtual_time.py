@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 from composer.model import Node, System
 from composer.runtime.clock import COMPUTER, VirtualClock
-from composer.runtime.executors.stacks import is_library, location_of, outward
+from composer.runtime.executors.tracebacks import is_library, location_of, outward
 from composer.runtime.intra_process.router import shared_channels
 from composer.runtime.node.interruption import RunningCallback, running_callbacks
 from composer.runtime.process import StartRefused

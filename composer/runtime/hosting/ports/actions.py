@@ -11,10 +11,10 @@ from rclpy.action.server import RCLError as ActionError
 
 from composer.behavior import CallCancelled
 from composer.model import PortKind
-from composer.runtime.executors.exceptions import is_closing
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.strand import InlineStrand
 from composer.runtime.executors.tasks import wait_for
+from composer.runtime.executors.tracebacks import is_closing
 from composer.runtime.hosting.instance import Instance
 from composer.runtime.hosting.ports.services import ServerInProcess, hosted_future
 from composer.runtime.hosting.user_code import UserFunction, call_in_group, interrupt_callbacks

@@ -14,8 +14,8 @@ from composer.base.source import Located
 from composer.model import Period, PeriodUnit, TimerClock
 from composer.model import Timer as TimerModel
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.stacks import calls_user_code
 from composer.runtime.executors.tasks import name_of
+from composer.runtime.executors.tracebacks import calls_user_code
 from composer.runtime.hosting.instance import Instance, is_reentrant
 from composer.runtime.hosting.user_code import call_in_group
 from composer.runtime.ports.timer import TimerPort
