@@ -17,7 +17,7 @@ from typing import Any, TextIO
 
 import pytest
 
-from composer.runtime.middleware.dds_participants import count_participants
+from composer.runtime.middleware.local_resources import count_participants
 from tests.examples import register_profiles
 
 TESTS = Path(__file__).parent

@@ -16,7 +16,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from composer.runtime.middleware.dds_participants import count_participants
+from composer.runtime.middleware.local_resources import count_participants
 from tests.ros.support.commands import COMPOSE, compose, start
 from tests.ros.support.dashboard import PATIENCE_S, Address, Browser, Dashboard, browser, dashboard
 from tests.ros.support.in_process import wait_until

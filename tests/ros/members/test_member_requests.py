@@ -13,8 +13,7 @@ from std_msgs.msg import String
 
 from composer.model import ExecutorKind
 from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.executors.event_counts import EventCounts
-from composer.runtime.executors.sources import Reply
+from composer.runtime.executors.sources import EventCounts, Reply
 from composer.runtime.manager.member_service import MemberService
 from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.members import process as member_process

@@ -12,7 +12,7 @@ import pytest
 
 from composer.base.source import Located, SourceFile, Span
 from composer.model import BehaviorReference
-from composer.runtime.executors.exceptions import report_of
+from composer.runtime.executors.tracebacks import report_of
 from composer.runtime.node.behavior_loader import ParameterValues, behavior_class
 
 SPAN = Span(SourceFile("system.yaml", ""), 1, 1, 1)

@@ -15,8 +15,8 @@ from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
-from composer.runtime.executors.event_counts import EventCounts
 from composer.runtime.executors.loop import Loop
+from composer.runtime.executors.sources import EventCounts
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, running, wait_until
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.middleware.shared_memory import SHARED_MEMORY
+from composer.runtime.middleware.local_resources import SHARED_MEMORY
 from composer.runtime.process.instance_lock import socket_path
 from tests.ros.process.test_restarts import children
 from tests.ros.support.commands import COMPOSE

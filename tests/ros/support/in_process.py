@@ -34,7 +34,7 @@ from composer.project import Project
 from composer.project.node_types import NodeTypes
 from composer.runtime.host import Host
 from composer.runtime.host_options import HostOptions
-from composer.runtime.middleware.shared_memory import remove_incomplete_ports
+from composer.runtime.middleware.local_resources import remove_incomplete_ports
 from composer.runtime.node.node import RunningNode
 from composer.runtime.protocol.reports import ChainFigures, SystemReport
 from composer.runtime.ros_graph.graph import servers_of

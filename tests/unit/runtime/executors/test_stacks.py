@@ -11,8 +11,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.runtime.executors.exceptions import describe
-from composer.runtime.executors.stacks import format_stack, gc_paused, stacks_of, user_frames
+from composer.runtime.executors.tracebacks import (
+    describe,
+    format_stack,
+    gc_paused,
+    stacks_of,
+    user_frames,
+)
 
 
 @pytest.fixture

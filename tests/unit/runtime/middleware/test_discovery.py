@@ -12,14 +12,15 @@ import pytest
 
 from composer.base.source import Located
 from composer.model import Discovery, DiscoveryKind
-from composer.runtime.middleware.dds_profiles import is_own_profile, use_discovery_profile
 from composer.runtime.middleware.dds_xml import profile_with_segment, use_interfaces
 from composer.runtime.middleware.environment import (
     active_variables,
     adopt_discovery,
     as_assignments,
     discovery_conflict,
+    is_own_profile,
     use_discovery,
+    use_discovery_profile,
 )
 from composer.runtime.process import StartRefused
 from composer.runtime.process.computer import PortState, port_state
