@@ -9,8 +9,7 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass
 from composer.behavior import Logger
-from composer.runtime.callbacks.queue import CallbackQueue, queue_for
-from composer.runtime.callbacks.user_code import Faults, UserCode
+from composer.runtime.callbacks.user_code import CallbackQueue, Faults, UserCode, queue_for
 from composer.runtime.clock import VirtualClock
 from composer.runtime.executors.base_loop import BaseLoop, ScheduledCall, TimerQueue
 from composer.runtime.executors.futures import Future

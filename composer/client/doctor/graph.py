@@ -16,7 +16,7 @@ from composer.client.doctor import CheckResult, error, note, ok, warning
 from composer.client.graph_names import GraphNames
 from composer.client.session import Deadline, Session
 from composer.model.qos import incompatibilities
-from composer.runtime.intra_process.ignore_local_publications import unsupported_reason
+from composer.runtime.intra_process.dds_flags import unsupported_reason
 from composer.runtime.middleware.environment import ROS_ARGUMENTS
 from composer.runtime.ros.messages import MessageError, interface_class
 from composer.runtime.ros_graph.endpoints import EndpointInfo, TopicInfo, topic_info

@@ -24,7 +24,7 @@ from composer.runtime.metrics.statistics import BATCH_SIZE, CallbackStatistics
 
 if TYPE_CHECKING:
     from composer.runtime.callbacks.context import NodeContext
-    from composer.runtime.callbacks.mutation_check import MutationCheck
+    from composer.runtime.callbacks.observers import MutationCheck
 
 T = TypeVar("T")
 

@@ -16,9 +16,8 @@ from rclpy.service import Service
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import Port
-from composer.runtime.callbacks.chains import NodeChains
 from composer.runtime.callbacks.log import ErrorLog, Log
-from composer.runtime.callbacks.mutation_check import MutationCheck
+from composer.runtime.callbacks.observers import MutationCheck, NodeChains
 from composer.runtime.callbacks.user_code import UserCode
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop

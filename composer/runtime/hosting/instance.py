@@ -31,8 +31,7 @@ from composer.runtime.executors.futures import Awaited, Future, done_event
 from composer.runtime.executors.strand import ExclusiveStrand, ReentrantStrand, Strand
 from composer.runtime.executors.tasks import name_of
 from composer.runtime.hosting.declared_ports import DeclaredPorts
-from composer.runtime.hosting.executor import InstanceExecutor
-from composer.runtime.hosting.user_code import PermittedFunction, UserFunction
+from composer.runtime.hosting.user_code import InstanceExecutor, PermittedFunction, UserFunction
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.ports import PortSet, RunningPort
 

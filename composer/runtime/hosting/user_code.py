@@ -1,20 +1,26 @@
-"""Calls the code of hosted classes, so that it is known which node's code a thread runs."""
+"""Calls the code of hosted classes, so that it is known which node's code a thread runs.
+
+The tasks of a class, which it creates with ``self.executor``, are code of the class as well.
+"""
 
 from __future__ import annotations
 
 import inspect
 import threading
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
+from functools import partial
 from types import FrameType
 from typing import TYPE_CHECKING, Any, cast
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.task import Future as RclpyFuture
 
 from composer.behavior import CallCancelled
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.executors.futures import Cancelled, Future
+from composer.runtime.executors.futures import Awaited, Cancelled, Future
+from composer.runtime.executors.loop import NodeExecutor
 from composer.runtime.executors.strand import in_steps, scope_of
-from composer.runtime.executors.tasks import sleep
+from composer.runtime.executors.tasks import name_of, sleep
 from composer.runtime.executors.tracebacks import (
     calls_user_code,
     gc_paused,
@@ -265,3 +271,63 @@ class ThreadedCall:
 _PERIOD_S = 0.02
 #: How long a callback may go on when its node is cleaned up.
 _RETURN_WITHIN_S = 0.2
+
+
+#: Packages that create tasks for their own functions. These call code of the class as such.
+_OTHERS = frozenset({"composer", "rclpy"})
+
+
+class InstanceExecutor(NodeExecutor):
+    """The part of ``rclpy.executors.Executor`` that classes use.
+
+    While a task blocks, others run. It is reported and interrupted as a callback is.
+    """
+
+    def __init__(self, instance: Instance) -> None:
+        super().__init__(instance.context.loop)
+        self._instance = instance
+        self._context = instance.context  # by which a task on a stack is recognized
+
+    def create_task(
+        self,
+        callback: Callable[..., Any] | Coroutine[Any, Any, Any],
+        *arguments: Any,
+        **options: Any,
+    ) -> RclpyFuture:
+        """Run a function, plain or ``async def``, or a coroutine; return the future of its result.
+
+        An exception is one of the future, and an error of the node.
+        """
+        if isinstance(callback, Coroutine):
+            function = UserFunction(self._instance, lambda: callback)
+        elif str(getattr(callback, "__module__", None)).partition(".")[0] in _OTHERS:
+            return super().create_task(callback, *arguments, **options)
+        else:
+            function = UserFunction(self._instance, partial(callback, *arguments, **options))
+        function.__name__ = name_of(callback).rpartition(".")[2]
+        outcome = RclpyFuture(executor=self)
+        self._context.spawn(self._run(function, outcome))
+        return outcome
+
+    @calls_user_code
+    async def _run(self, function: UserFunction, outcome: RclpyFuture) -> None:
+        try:
+            result = function()
+            outcome.set_result(await result if isinstance(result, Coroutine) else result)
+        except BaseException as error:
+            fail(outcome, error)
+            self._context.on_exception(function.__name__, error)
+
+    def spin_until_future_complete(self, future: Awaited, timeout_sec: float | None = None) -> None:
+        """Wait for a future, or for a time."""
+        self._instance.spin(future, timeout_sec)
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Wait until a callback has ended, or for a time."""
+        self._instance.spin_once(timeout_sec)
+
+
+def fail(future: RclpyFuture, error: BaseException) -> None:
+    """Fail a future. rclpy prints exceptions that are never retrieved, but not this one."""
+    future.set_exception(error)
+    future.exception()

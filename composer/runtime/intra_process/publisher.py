@@ -13,8 +13,8 @@ from rclpy.serialization import deserialize_message
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock import Clock
+from composer.runtime.intra_process.dds_flags import MATCH_FLAG, MATCHING
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
-from composer.runtime.intra_process.match_flag import MATCH_FLAG, MATCHING
 
 
 class Target(Protocol):

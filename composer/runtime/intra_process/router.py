@@ -16,7 +16,7 @@ from rclpy.subscription import Subscription
 from composer.model import Channel, ChannelKind, Delivery, Port, System, channels
 from composer.model.qos import Liveliness, QosProfile, incompatibilities
 from composer.runtime.host_options import Instruments, Recorder
-from composer.runtime.intra_process.ignore_local_publications import (
+from composer.runtime.intra_process.dds_flags import (
     ignore_local,
     unsupported_reason,
 )

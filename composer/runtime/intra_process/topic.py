@@ -17,7 +17,7 @@ from rclpy.publisher import Publisher
 from composer.model import Isolation, Port
 from composer.model.qos import Durability, QosProfile, incompatibilities
 from composer.runtime.clock import Clock
-from composer.runtime.intra_process.match_flag import MATCHING, MatchListener
+from composer.runtime.intra_process.dds_flags import MATCHING, MatchListener
 from composer.runtime.intra_process.publisher import (
     GatedPublisher,
     PublisherContext,

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import FrameType
 
 from composer.base.fast_dataclass import dataclass
-from composer.runtime.callbacks.queue import CallbackQueue
 from composer.runtime.callbacks.reactions import RunningReaction
+from composer.runtime.callbacks.user_code import CallbackQueue
 from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.base_loop import end_wait
 from composer.runtime.executors.tracebacks import (

@@ -20,7 +20,7 @@ from composer.model.lifecycle import FINALIZED
 from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
-from composer.runtime.callbacks.mutation_check import MessageSnapshots, MutationCheck
+from composer.runtime.callbacks.observers import MessageSnapshots, MutationCheck
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import rclpy_callback
 from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand

@@ -12,8 +12,7 @@ from rclpy.parameter import Parameter
 from composer.base.fast_dataclass import dataclass
 from composer.model import Node
 from composer.model.qos import QosProfile
-from composer.runtime.callbacks.chains import Chains
-from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.callbacks.observers import Chains, MessageSnapshots
 from composer.runtime.executors.sources import EventCounts
 from composer.runtime.host_options import Instruments, Recorder, Tap
 from composer.runtime.intra_process.router import LocalRouter

@@ -13,9 +13,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallError, GoalRejected
 from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.queue import queue_for
+from composer.runtime.callbacks.user_code import queue_for
 from composer.runtime.executors.futures import Future, wrap_future
-from composer.runtime.ports.client import CallingPort, CallLimit
+from composer.runtime.ports.services import CallingPort, CallLimit
 from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
 

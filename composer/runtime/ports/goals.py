@@ -9,8 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallCancelled, Goal
 from composer.model import Port
-from composer.runtime.callbacks.queue import queue_for
-from composer.runtime.callbacks.user_code import UserCode
+from composer.runtime.callbacks.user_code import UserCode, queue_for
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.tasks import wait_for
 from composer.runtime.executors.tracebacks import calls_user_code, is_closing, shown, text_of

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.behavior import CallError, ServerUnavailable
 from composer.model import Port
-from composer.runtime.callbacks.queue import queue_for
-from composer.runtime.callbacks.user_code import UserCode
+from composer.runtime.callbacks.user_code import UserCode, queue_for
 from composer.runtime.executors.futures import Cancelled
 from composer.runtime.executors.tracebacks import calls_user_code, describe, is_closing, shown
 from composer.runtime.ports import RunningPort

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.model import Timer, TimerClock
 from composer.runtime.callbacks.callback import EMPTY, Callback, mutation_checked
-from composer.runtime.callbacks.queue import queue_for
+from composer.runtime.callbacks.user_code import queue_for
 from composer.runtime.executors.tasks import TimerHandle
 from composer.runtime.ports import RunningPort
 

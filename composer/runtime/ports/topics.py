@@ -13,7 +13,7 @@ from composer.model import Port
 from composer.model.qos import Durability
 from composer.runtime.callbacks.callback import mutation_checked
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.callbacks.mutation_check import RememberingTarget
+from composer.runtime.callbacks.observers import RememberingTarget
 from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.intra_process.publisher import PublisherContext, Target
 from composer.runtime.intra_process.topic import LatchedMessages

@@ -17,9 +17,8 @@ from composer.model import (
     System,
 )
 from composer.model.names import join
-from composer.runtime.callbacks.chains import Chains
 from composer.runtime.callbacks.log import Write, set_level
-from composer.runtime.callbacks.mutation_check import MessageSnapshots
+from composer.runtime.callbacks.observers import Chains, MessageSnapshots
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tracebacks import exception_log

@@ -18,13 +18,12 @@ from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.sources import complete_request
-from composer.runtime.hosting.executor import fail
 from composer.runtime.hosting.instance import Instance, is_reentrant
-from composer.runtime.hosting.user_code import UserFunction
+from composer.runtime.hosting.user_code import UserFunction, fail
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
 from composer.runtime.ports import RunningPort
-from composer.runtime.ports.service import ServicePort
+from composer.runtime.ports.services import ServicePort
 
 S = TypeVar("S")
 
