@@ -16,8 +16,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int64
 
-from composer.runtime.intra_process import match_flag
-from composer.runtime.intra_process.ignore_local_publications import (
+from composer.runtime.intra_process import dds_flags
+from composer.runtime.intra_process.dds_flags import (
     RmwSubscription,
     RmwSubscriptionOptions,
     unsupported_reason,
@@ -185,15 +185,15 @@ def test_every_message_arrives_once_with_any_middleware_and_the_doctor_reports_i
 def test_the_self_test_leaves_nothing_in_the_graph(
     reports_matches: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(match_flag.MATCHING, "is_supported", not reports_matches)
+    monkeypatch.setattr(dds_flags.MATCHING, "is_supported", not reports_matches)
     if not reports_matches:
-        monkeypatch.setattr(match_flag, "EVENT", lambda *_: 0)  # it is accepted and never called
+        monkeypatch.setattr(dds_flags, "EVENT", lambda *_: 0)  # it is accepted and never called
     context = Context()
     context.init([])
     node = Node("watcher", context=context)
     try:
         assert unsupported_reason.__wrapped__(context) is None
-        assert match_flag.MATCHING.is_supported == reports_matches
+        assert dds_flags.MATCHING.is_supported == reports_matches
         found = [*node.get_service_names_and_types(), *node.get_topic_names_and_types()]
         assert [name for name, _ in found if "trial" in name] == []
     finally:

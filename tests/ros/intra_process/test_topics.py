@@ -21,7 +21,7 @@ from std_msgs.msg import Int64
 from composer.model import LogLevel
 from composer.runtime.executors.scheduler import Scheduler
 from composer.runtime.host_options import HostOptions
-from composer.runtime.intra_process import match_flag
+from composer.runtime.intra_process import dds_flags
 from tests.ros.support.counting import MODULE, NUMBERS, numbers, send
 from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
 
@@ -39,8 +39,8 @@ def wait_for_matches(system: RunningSystem, is_matched: Callable[[int], bool]) -
     def is_counted() -> bool:
         matched = of_rclpy.get_subscription_count()
         has_external = matched > len(publisher._subscriptions)
-        is_current = publisher._generation is match_flag.MATCHING.generation
-        will_check = not match_flag.MATCH_FLAG[0] or not is_current
+        is_current = publisher._generation is dds_flags.MATCHING.generation
+        will_check = not dds_flags.MATCH_FLAG[0] or not is_current
         return is_matched(matched) and (publisher._has_external is has_external or will_check)
 
     wait_until(is_counted, "the number of matched subscriptions")
@@ -84,7 +84,7 @@ def test_every_external_subscription_is_noticed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_supported: bool, level: str
 ) -> None:
     if not is_supported:  # then matches are counted for each message
-        monkeypatch.setattr(match_flag.MATCHING, "is_supported", False)
+        monkeypatch.setattr(dds_flags.MATCHING, "is_supported", False)
     context = Context()
     context.init([])
     node = Node("external", context=context)
@@ -220,14 +220,14 @@ def test_the_generation_changes_before_and_after_the_flag_is_set(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Once the flag is set, no thread may see the old generation."""
-    matching = match_flag.Matching()
+    matching = dds_flags.Matching()
     generations = [matching.generation]
 
     class Flag(bytearray):
         def __setitem__(self, *_: Any) -> None:
             generations.append(matching.generation)
 
-    monkeypatch.setattr(match_flag, "MATCH_FLAG", Flag(1))
+    monkeypatch.setattr(dds_flags, "MATCH_FLAG", Flag(1))
     matching.begin_generation()
     assert len({*generations, matching.generation}) == 3
 
