@@ -70,9 +70,9 @@ from composer.runtime.supervision.main_queue import (
     Item,
     MainQueue,
     SupervisionContext,
+    SupervisionListener,
 )
 from composer.runtime.supervision.node_factory import NodeFactory
-from composer.runtime.supervision.node_listener import SupervisionListener
 from composer.runtime.supervision.node_set import CreationFailed, NodeSet
 from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.start_and_end import SystemEnd, SystemStart

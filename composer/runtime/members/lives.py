@@ -8,23 +8,69 @@ answers. What the process is, is learnt from its instance lock, its end as a chi
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import field
 from typing import Any
 
+from rclpy.node import Node as RosNode
 from std_msgs.msg import String
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import LogLevel
+from composer.model import LogLevel, Process
+from composer.model.hosts import own_enclave
 from composer.model.names import PROGRAM_LOGGER
-from composer.runtime.children.child_processes import Child
-from composer.runtime.members.context import MemberContext
-from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held, report_key
+from composer.runtime.children.child_processes import Child, ChildProcesses, Command
+from composer.runtime.executors.loop import Loop
+from composer.runtime.middleware.environment import CONSOLE_FORMAT
+from composer.runtime.process.instance_lock import (
+    ALREADY_RUNS,
+    REPORT_KEY_VARIABLE,
+    is_held,
+    report_key,
+)
 from composer.runtime.protocol.codec import ProtocolError, decode
 from composer.runtime.protocol.reports import NodeReport, SystemReport, is_signed, split_signature
 from composer.runtime.protocol.requests import NAME, STATE_TOPIC
 from composer.runtime.ros.service_requests import STATE_QOS
+
+
+class ProcessUnavailable(Exception):
+    """The process cannot be started, or has ended; the text is the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class MemberContext:
+    """What a process of the system needs from the one that coordinates it.
+
+    ``namespace`` is that of the coordinating manager; ``command`` starts ``compose run`` with the
+    same system, and is empty if the process is only to be awaited. What nodes report within the
+    context manager ``together`` is handled together.
+    """
+
+    loop: Loop
+    manager: RosNode
+    children: ChildProcesses
+    namespace: str
+    command: Sequence[str]
+    write_log: Callable[[LogLevel, str, str], None]
+    together: Callable[[], AbstractContextManager[None]] = nullcontext
+
+    def full_name(self, process: Process) -> str:
+        """Return the full name of a process, which is the namespace of its manager."""
+        return f"{self.namespace}/{process.name.value}"
+
+    def command_of(self, process: Process, report_key: str) -> Command:
+        """Return the command that starts a process, which signs its reports with the key."""
+        words = (*self.command, "--process", process.name.value)
+        # Its lines are parsed, whatever format those of this process have.
+        usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
+        usual |= own_enclave(os.environ, self.full_name(process))
+        environment = {name.value: value for name, value in process.environment}
+        return Command(words, {**usual, **environment, REPORT_KEY_VARIABLE: report_key})
+
 
 #: Processes report every second. One that has not reported for this time is lost.
 REPORTS_WITHIN_S = 5.0

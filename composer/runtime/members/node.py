@@ -20,7 +20,7 @@ from composer.plan import Condition
 from composer.runtime.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import wait_for
-from composer.runtime.members.context import ProcessUnavailable
+from composer.runtime.members.lives import ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import (

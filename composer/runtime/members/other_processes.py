@@ -9,8 +9,8 @@ from composer.model import PrimaryState, System
 from composer.runtime.callbacks.log import Write
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.loop import Loop
-from composer.runtime.members.context import MemberContext
 from composer.runtime.members.kept_goals import KeptGoals
+from composer.runtime.members.lives import MemberContext
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.computer import is_this_computer

@@ -22,13 +22,14 @@ from composer.runtime.children.output import attribute_line, process_loggers
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.executors.tracebacks import printable
-from composer.runtime.members.context import MemberContext, ProcessUnavailable
 from composer.runtime.members.lives import (
     REPORTS_WITHIN_S,
+    MemberContext,
     MemberLife,
     MemberLives,
     MemberReports,
     NodeFigures,
+    ProcessUnavailable,
 )
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.process.instance_lock import ALREADY_RUNS, is_held

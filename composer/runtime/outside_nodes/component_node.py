@@ -19,8 +19,8 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import wait_for
 from composer.runtime.node.parameters import parameter_message
-from composer.runtime.outside_nodes.external_node import PERIOD_S
 from composer.runtime.outside_nodes.outside_node import (
+    PERIOD_S,
     OutsideContext,
     OutsideNode,
     TransitionRefused,

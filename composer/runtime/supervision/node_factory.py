@@ -36,9 +36,8 @@ from composer.runtime.node.managed_node import (
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
 from composer.runtime.outside_nodes.component_node import ComponentNode
-from composer.runtime.outside_nodes.executable_node import ExecutableNode
-from composer.runtime.outside_nodes.external_node import ExternalNode
-from composer.runtime.outside_nodes.outside_node import OutsideContext
+from composer.runtime.outside_nodes.outside_node import ExternalNode, OutsideContext
+from composer.runtime.outside_nodes.started_node import ExecutableNode
 
 #: The loop on which all nodes outside the process are driven.
 _OUTSIDE = "nodes outside the process"

@@ -22,7 +22,6 @@ from composer.plan import (
     is_nothing_left,
     reconcile,
 )
-from composer.runtime.supervision.fault_handler import FaultHandler
 from composer.runtime.supervision.main_queue import (
     Command,
     LoopRecovered,
@@ -32,7 +31,7 @@ from composer.runtime.supervision.main_queue import (
     StepEnded,
 )
 from composer.runtime.supervision.phases import ExecutionOptions, StepFailed
-from composer.runtime.supervision.reconciler import Reconciler
+from composer.runtime.supervision.reconciler import FaultHandler, Reconciler
 
 #: In the cause of a plan that moves of several nodes have caused.
 _MAX_CAUSES = 3
