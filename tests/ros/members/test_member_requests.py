@@ -18,7 +18,7 @@ from composer.runtime.manager.member_service import MemberService
 from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.members import process as member_process
 from composer.runtime.members import requests as member_requests
-from composer.runtime.members.context import MemberContext, ProcessUnavailable
+from composer.runtime.members.lives import MemberContext, ProcessUnavailable
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
 from composer.runtime.node.options import ProcessContext
