@@ -24,8 +24,10 @@ from composer.plan.reconciliation import (
     optional_nodes,
     reconcile,
 )
-from composer.plan.steps import Plan, Step, TransitionName
 from composer.plan.transitions import (
+    Plan,
+    Step,
+    TransitionName,
     bring_up,
     plan_transitions,
     start_causes,

@@ -14,8 +14,7 @@ from dataclasses import replace
 from composer.model import PrimaryState, System
 from composer.model.dependencies import DependencyEdge, dependency_edges, in_dependency_order
 from composer.plan.desired_state import Condition, DesiredState
-from composer.plan.steps import Plan, nodes_of, rank
-from composer.plan.transitions import plan_transitions, start_goals
+from composer.plan.transitions import Plan, nodes_of, plan_transitions, rank, start_goals
 
 #: The condition of a node that takes its time.
 STARTING = "starting"

@@ -8,8 +8,7 @@ from composer.model import TF_STATIC_TOPIC, Transforms
 from composer.model.geometry import Quaternion, Transform, Vector
 from composer.runtime.node.transforms import NodeTransforms
 from composer.runtime.transforms.buffer import TransformBuffer
-from composer.runtime.transforms.listener import TransformListeners
-from composer.runtime.transforms.messages import nanoseconds, transform_of
+from composer.runtime.transforms.listener import TransformListeners, nanoseconds, transform_of
 from composer.testing.behavior_context import TestContext
 from composer.testing.behavior_ports import PublisherPort
 from composer.testing.failures import TestFailure

@@ -13,7 +13,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import Node, Port
 from composer.runtime.clock import Clock
 from composer.runtime.intra_process.publisher import copy_of
-from composer.runtime.intra_process.time_limits import Receiver
+from composer.runtime.intra_process.topic import Receiver
 from composer.testing.tester import Tester
 
 #: Receives a message, and passes on what it likes by the function.

@@ -28,9 +28,10 @@ from composer.runtime.intra_process.servers import (
     Receive,
 )
 from composer.runtime.intra_process.taps import tap_of
-from composer.runtime.intra_process.time_limits import Leases, Receiver
 from composer.runtime.intra_process.topic import (
+    Leases,
     LocalSubscription,
+    Receiver,
     Topic,
     local_publisher_for,
 )

@@ -29,9 +29,9 @@ from composer.runtime.ports import RunningPort
 from composer.runtime.ports.topics import PublisherPort
 from composer.runtime.ros.messages import interface_class
 from composer.runtime.transforms.buffer import Found, TransformBuffer
-from composer.runtime.transforms.listener import TransformListeners
-from composer.runtime.transforms.messages import (
+from composer.runtime.transforms.listener import (
     POSES,
+    TransformListeners,
     check_transform,
     moved,
     nanoseconds,

@@ -25,7 +25,7 @@ from composer.model import Port, PortKind
 from composer.model.qos import Liveliness, incompatibilities
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.intra_process.publisher import Target
-from composer.runtime.intra_process.time_limits import (
+from composer.runtime.intra_process.topic import (
     Leases,
     MonitoredReceiver,
     OnOverdue,
@@ -146,7 +146,7 @@ class QosEvents:
     it measures a deadline or a lease from the last message, even if that was sent before the node
     was deactivated. So an event also counts only if the node was active for the whole period.
 
-    In virtual time, the middleware is not asked: ``time_limits`` monitors deadlines and leases.
+    In virtual time, the middleware is not asked: ``topic`` monitors deadlines and leases.
     """
 
     #: Whether it watches matches, so that in-process delivery cannot.

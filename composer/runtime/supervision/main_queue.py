@@ -17,7 +17,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node, PrimaryState, System
 from composer.model.lifecycle import FINALIZED, TRANSITIONS
 from composer.plan import DesiredState, Fault, FaultKind
-from composer.plan.steps import REACHED
+from composer.plan.transitions import REACHED
 from composer.runtime.clock import Clock
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.process.signals import wakeup_for

@@ -20,7 +20,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.hosting.user_code import call_in_group
-from composer.runtime.intra_process.time_limits import OnOverdue
+from composer.runtime.intra_process.topic import OnOverdue
 from composer.runtime.ports.qos_events import EventKind, QosEvents
 
 _PUBLISHER = QoSPublisherEventType
