@@ -1,6 +1,6 @@
 """Characters that control a terminal, change the direction of text, or are invisible.
 
-And the width of text in a terminal, and numbers with their nouns.
+And the width of text in a terminal, numbers with their nouns, and lists of names.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import unicodedata
+from collections.abc import Sequence
 
 #: For a character class of re: characters that change the direction of text or are invisible.
 INVISIBLE = "\u061c\u200b\u200e\u200f\u202a-\u202e\u2060-\u2069"
@@ -29,6 +30,12 @@ _TAB = "    "
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun: ``1 error``, ``2 errors``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Return names as one text, at most so many: ``a, b and 3 more``."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def is_safe(text: str) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from dataclasses import replace
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ from composer.runtime.node.behavior_loader import (
     method,
     named_ports,
 )
-from composer.runtime.ports import PortSet, RunningPort
+from composer.runtime.ports import PortSet, RunningPort, deactivate, settle
 from composer.runtime.ports.goals import Handlers
 from composer.runtime.ports.timer import TimerPort
 from composer.testing.behavior_context import TestContext
@@ -101,9 +101,9 @@ class TestNode:
             if self.transforms is not None:
                 self.transforms.begin()
         elif start == ACTIVE:
-            await self._deactivate(gate, tuple(self._entities.gated))
+            await deactivate(gate, self._entities.gated)
         if transition in ("cleanup", "shutdown"):
-            await self._deactivate(always_on_gate, self._entities.always_on)
+            await deactivate(always_on_gate, self._entities.always_on)
         await self._call_handler(f"on_{transition}")
 
     async def _process_error(self, transition: str, error: BaseException) -> str:
@@ -112,8 +112,8 @@ class TestNode:
         self.state = "errorprocessing"
 
         async def work() -> None:
-            await self._deactivate(self._gates[0], tuple(self._entities.gated))
-            await self._deactivate(self._gates[1], self._entities.always_on)
+            await deactivate(self._gates[0], self._entities.gated)
+            await deactivate(self._gates[1], self._entities.always_on)
             self._gates[0].waiting = True
             await self._call_handler("on_error", error)
 
@@ -136,14 +136,6 @@ class TestNode:
         except TimeoutError:
             raise TestFailure(f"timed out after {limit_s:g} s") from None
 
-    async def _deactivate(self, gate: LifecycleGate, ports: Sequence[RunningPort]) -> None:
-        gate.incoming = False
-        for port in ports:
-            port.deactivate()
-        gate.cancel_pending()
-        for port in ports:
-            await port.drain()
-
     async def _call_handler(self, name: str, *arguments: Any) -> None:
         handler = method(self._behavior, name)
         if handler is None:
@@ -165,17 +157,8 @@ class TestNode:
         self.state = state
         self._context.note(f"the node is {state}")
         is_configured = state in (INACTIVE, ACTIVE)
-        for gate, ports, is_open in (
-            (self._gates[0], self._entities.gated, state == ACTIVE),
-            (self._gates[1], self._entities.always_on, is_configured),
-        ):
-            gate.state = state
-            if is_open:
-                gate.open()
-            for port in ports:
-                (port.activate if is_open else port.deactivate)()
-            if not is_open:
-                gate.close()
+        settle(self._gates[0], state, state == ACTIVE, self._entities.gated)
+        settle(self._gates[1], state, is_configured, self._entities.always_on)
         if not is_configured:
             self._context.cancel_tasks()
             for port in self._entities.ports:

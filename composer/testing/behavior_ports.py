@@ -12,15 +12,13 @@ from composer.behavior import CallCancelled, CallTimeout, ServerUnavailable
 from composer.model import Port
 from composer.model.qos import Durability
 from composer.runtime.executors.futures import Future, wrap_future
-from composer.runtime.ports import RunningPort
+from composer.runtime.ports import DEFAULT_TIMEOUT_MS, RunningPort
+from composer.runtime.ports.goals import GoalOutcome
 from composer.runtime.ports.serving import RequestServer
 from composer.testing.behavior_context import TestContext
-from composer.testing.goals import ActionServerPort, Outcome, ServedGoal
+from composer.testing.goals import ActionServerPort, ServedGoal
 
 T = TypeVar("T")
-
-#: The limit of a call unless YAML sets one, as in the runtime.
-_DEFAULT_TIMEOUT_MS = 5000.0
 
 
 class PublisherPort(RunningPort):
@@ -112,7 +110,7 @@ class ClientPort(RunningPort):
         self._what = f"{port.kind.channel} '{port.full_name}'"
         self._label = f"{port.kind} '{self._name}'"
         limit = port.timeout_ms
-        self._timeout_ms = _DEFAULT_TIMEOUT_MS if limit is None else limit.value
+        self._timeout_ms = DEFAULT_TIMEOUT_MS if limit is None else limit.value
         self._result_timeout_ms = inf if (most := port.result_timeout_ms) is None else most.value
         self.service_type = self.action_type = interface
         self._server: Future[Any] = Future()
@@ -169,7 +167,7 @@ class ClientPort(RunningPort):
         text = f"{what.format(self._what)} within {timeout_ms:g} ms"
         return gate.pending.add(future, until_s, lambda: late(text))
 
-    async def result(self, goal: ServedGoal, timeout_ms: float | None) -> Outcome:
+    async def result(self, goal: ServedGoal, timeout_ms: float | None) -> GoalOutcome:
         """Wait until a goal has ended."""
         limit_ms = self._result_timeout_ms if timeout_ms is None else timeout_ms
         return await self.limited(goal.result(), limit_ms)
@@ -227,7 +225,7 @@ class ClientGoal:
         self._port = port
         self._goal = goal
 
-    def result(self, *, timeout_ms: float | None = None) -> Future[Outcome]:
+    def result(self, *, timeout_ms: float | None = None) -> Future[GoalOutcome]:
         """Wait until the goal has ended. Fails with CallTimeout or CallCancelled."""
         return self._context.spawn(self._port.result(self._goal, timeout_ms))
 

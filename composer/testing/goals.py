@@ -5,22 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
-from composer.base.fast_dataclass import dataclass
 from composer.behavior import GoalRejected
 from composer.runtime.executors.futures import Future, wrap_future
 from composer.runtime.executors.tasks import sleep
-from composer.runtime.ports.goals import GoalExecutor
+from composer.runtime.ports.goals import GoalExecutor, GoalOutcome
 
 #: Waits for a future, at most for a time; the text says for what.
 WaitFor: TypeAlias = Callable[[Future[Any], float, str], Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """How a goal ended; see :class:`composer.behavior.GoalResult`."""
-
-    status: str
-    result: Any
 
 
 class ServedGoal:
@@ -40,7 +31,7 @@ class ServedGoal:
         self.task: Future[Any] | None = None
         self.cancel_requested: Future[None] = Future()
         self.ended: Future[None] = Future()
-        self.outcome: Future[Outcome] = Future()
+        self.outcome: Future[GoalOutcome] = Future()
 
     @property
     def is_open(self) -> bool:
@@ -82,7 +73,7 @@ class ServedGoal:
 
     # --- the client's view
 
-    def result(self) -> Future[Outcome]:
+    def result(self) -> Future[GoalOutcome]:
         """Return a future of the outcome, which may be canceled."""
         return wrap_future(self.outcome, cancels=False)
 
@@ -124,7 +115,7 @@ class ActionServerPort(GoalExecutor[ServedGoal]):
         return await super()._steps(goal)
 
     def _send_result(self, goal: ServedGoal, result: Any) -> None:
-        goal.outcome.set_result(Outcome(goal.status, result))
+        goal.outcome.set_result(GoalOutcome(goal.status, result))
 
 
 class Goal:

@@ -50,11 +50,6 @@ def set_level(node: str, level: LogLevel) -> None:
     set_logger_level(logger_name(node), SEVERITIES[level])
 
 
-def severity(level: LogLevel) -> int:
-    """Return the number of a level, which is greater the more severe it is."""
-    return SEVERITIES[level]
-
-
 class Log:
     """A behavior's ``log``: to the console of the process, and to /rosout.
 

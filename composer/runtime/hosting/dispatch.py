@@ -44,7 +44,8 @@ _SPINS = (
 def install() -> None:
     """Let rclpy's functions dispatch by the type of their node."""
     _install_nodes()
-    _install_actions()
+    _install_action(ActionServer, PortKind.ACTION_SERVER)
+    _install_action(ActionClient, PortKind.ACTION_CLIENT)
     _install_spinning()
     _install_executors()
     _install_waiting()
@@ -75,14 +76,6 @@ def _install_nodes() -> None:
 
     Node.__init__ = init_node  # type: ignore[method-assign]
     LifecycleNodeMixin.__init__ = init_mixin  # type: ignore[method-assign]
-
-
-def _install_actions() -> None:
-    for kind, role in (
-        (ActionServer, PortKind.ACTION_SERVER),
-        (ActionClient, PortKind.ACTION_CLIENT),
-    ):
-        _install_action(kind, role)
 
 
 def _install_action(kind: Any, role: PortKind) -> None:
@@ -218,8 +211,7 @@ def _wait_until_ended(instance: Instance) -> None:
 
 
 def _install_context() -> None:
-    init, shutdown, try_shutdown = rclpy.init, rclpy.shutdown, utilities.try_shutdown
-    is_ok = utilities.ok
+    init, is_ok = rclpy.init, utilities.ok
 
     def ok(**options: Any) -> bool:
         # Threads of classes loop while it is true.
@@ -230,21 +222,17 @@ def _install_context() -> None:
         # It is initialized already.
         return init(**options) if current_instance() is None else contextlib.nullcontext()
 
-    def shut_down(**options: Any) -> None:
-        instance = current_instance()
-        if instance is None:
-            shutdown(**options)
-        else:
-            instance.settings.finish("it called rclpy.shutdown()")
+    def finishing(shutdown: Any, name: str) -> Any:
+        def shut_down(**options: Any) -> None:
+            instance = current_instance()
+            if instance is None:
+                shutdown(**options)
+            else:
+                instance.settings.finish(f"it called rclpy.{name}()")
 
-    def try_to_shut_down(**options: Any) -> None:
-        instance = current_instance()
-        if instance is None:
-            try_shutdown(**options)
-        else:
-            instance.settings.finish("it called rclpy.try_shutdown()")
+        return shut_down
 
     rclpy.ok = ok  # type: ignore[attr-defined]
     rclpy.init = init_context
-    rclpy.shutdown = shut_down
-    rclpy.try_shutdown = try_to_shut_down  # type: ignore[attr-defined]
+    rclpy.shutdown = finishing(rclpy.shutdown, "shutdown")
+    rclpy.try_shutdown = finishing(utilities.try_shutdown, "try_shutdown")  # type: ignore[attr-defined]

@@ -228,7 +228,8 @@ class Instance:
 
         From the first spin in the constructor to its end, callbacks run as if the node were active.
         """
-        if self.is_constructing and not self._gates and self._is_in_transition():
+        is_constructor = threading.current_thread() is self.transition_thread
+        if self.is_constructing and is_constructor and not self._gates:
             for context in (self.context, self._always_on_context):
                 gate = context.gate
                 self._gates.append((gate, gate.incoming, gate.outgoing))
@@ -252,9 +253,6 @@ class Instance:
         if gates:
             for port in self.entities.ports:
                 port.deactivate()
-
-    def _is_in_transition(self) -> bool:
-        return threading.current_thread() is self.transition_thread
 
     def instrumented(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         """Return a callback of the class, with the faults of a test if there is one."""

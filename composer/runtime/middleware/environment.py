@@ -45,8 +45,7 @@ def use_discovery(discovery: Discovery | None, environment: MutableMapping[str, 
 
     Call it after the profile has been selected.
     """
-    if discovery is not None and discovery_conflict(discovery, environment) is None:
-        _set_missing(discovery.variables, environment)
+    _set_missing(active_variables(discovery, environment), environment)
 
 
 def discovery_conflict(discovery: Discovery, environment: Mapping[str, str]) -> str | None:
@@ -94,12 +93,10 @@ def adopt_discovery(environment: MutableMapping[str, str]) -> str | None:
 
 def as_assignments(variables: Mapping[str, str]) -> str:
     """Return the variables as a shell takes them after ``export``."""
-    return " ".join(_assignments(variables))
-
-
-def _assignments(variables: Mapping[str, str]) -> Iterator[str]:
-    for name, value in variables.items():
-        yield f"{name}='{value}'" if ";" in value else f"{name}={value}"
+    return " ".join(
+        f"{name}='{value}'" if ";" in value else f"{name}={value}"
+        for name, value in variables.items()
+    )
 
 
 def _set_missing(variables: Mapping[str, str], environment: MutableMapping[str, str]) -> None:

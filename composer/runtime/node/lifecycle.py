@@ -289,7 +289,9 @@ class Lifecycle(ManagedLifecycle):
         reply(GetState.Response(current_state=State(id=state_id, label=label)))
 
     def _on_get_available_states(self, _: GetAvailableStates.Request, reply: Reply) -> None:
-        states = [State(id=state_id, label=label) for state_id, label in _states(self._machine)]
+        states = [
+            State(id=state_id, label=label) for state_id, label in self._machine.available_states
+        ]
         reply(GetAvailableStates.Response(available_states=states))
 
     def _on_get_transitions(
@@ -314,10 +316,6 @@ def _requested(request: ChangeState.Request, available: Mapping[str, int]) -> st
 
 def _label(request: ChangeState.Request) -> str:
     return str(request.transition.label) or f"transition {request.transition.id}"
-
-
-def _states(machine: Any) -> list[tuple[int, str]]:
-    return list(machine.available_states)
 
 
 def _described(entry: tuple[int, str, int, str, int, str]) -> TransitionDescription:

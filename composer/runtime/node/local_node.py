@@ -8,7 +8,6 @@ The kinds of nodes differ in what they create and call in a transition. See
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol, TypeVar
@@ -20,7 +19,7 @@ from composer.model.lifecycle import FINALIZED
 from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
-from composer.runtime.callbacks.observers import MessageSnapshots, MutationCheck
+from composer.runtime.callbacks.observers import MutationCheck
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import rclpy_callback
 from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
@@ -32,7 +31,7 @@ from composer.runtime.node.managed_node import ManagedNode, NodeListener, Transi
 from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time import NodeTime
-from composer.runtime.ports import PortSet, RunningPort
+from composer.runtime.ports import PortSet, deactivate, settle
 
 T = TypeVar("T")
 
@@ -83,6 +82,7 @@ class LocalNode(ManagedNode):
         log = Log(self._ros, listener.write_log, rosout=offers.rosout, recorder=recorder)
         self._error_limit = _error_limit(model, listener)
         error_log = ErrorLog(log, loop.clock, self.statistics, listener.on_error, self._error_limit)
+        seen = options.seen_messages
         self._context = NodeContext(
             node=self._ros,
             loop=loop,
@@ -96,7 +96,7 @@ class LocalNode(ManagedNode):
             router=options.router,
             chains=options.chains.of(model),
             events=options.process.events,
-            mutations=_mutation_check(options.seen_messages, error_log),
+            mutations=None if seen is None else MutationCheck(seen, error_log.error),
             instruments=options.instruments,
         )
         record_parameter_events(self._ros, recorder)  # with stamps of the clock that it has now
@@ -226,16 +226,16 @@ class LocalNode(ManagedNode):
         elif transition == "activate":
             gate.outgoing = True
         elif start == "active":
-            await self._deactivate(self._context, self._entities.gated)
+            await deactivate(self._context.gate, self._entities.gated)
         if transition in ("cleanup", "shutdown"):
-            await self._deactivate(self._always_on_context, self._entities.always_on)
+            await deactivate(self._always_on_context.gate, self._entities.always_on)
         await self._call_user(transition)
 
     async def on_error(self, cause: BaseException) -> None:
         """Let the user's code clean up. What it raises finalizes the node."""
         self._begin_transition()
-        await self._deactivate(self._context, self._entities.gated)
-        await self._deactivate(self._always_on_context, self._entities.always_on)
+        await deactivate(self._context.gate, self._entities.gated)
+        await deactivate(self._always_on_context.gate, self._entities.always_on)
         self._context.gate.waiting = True
         await self._call_user_on_error(cause)
 
@@ -246,9 +246,9 @@ class LocalNode(ManagedNode):
             is_activation = result.transition == "activate"
             self.activations += is_activation
             self._resume_error_limit(restart=is_activation)
-        _settle(self._context.gate, state, state == "active", self._entities.gated)
+        settle(self._context.gate, state, state == "active", self._entities.gated)
         is_configured = state in ("inactive", "active")
-        _settle(self._always_on_context.gate, state, is_configured, self._entities.always_on)
+        settle(self._always_on_context.gate, state, is_configured, self._entities.always_on)
         if state in ("unconfigured", FINALIZED):
             self._release(result)
         self._listener.on_transition_end(result)
@@ -270,16 +270,6 @@ class LocalNode(ManagedNode):
         else:  # a refused transition
             self._error_limit.paused = False
 
-    async def _deactivate(self, context: NodeContext, ports: Iterable[RunningPort]) -> None:
-        """Stop receiving and cancel what is pending. Publishers stay open for last messages."""
-        context.gate.incoming = False
-        deactivated = tuple(ports)
-        for port in deactivated:
-            port.deactivate()
-        context.gate.cancel_pending()
-        for port in deactivated:
-            await port.drain()
-
     def _release(self, outcome: TransitionOutcome | None = None) -> None:
         self._context.cancel_tasks()
         if self._keeps_entities:
@@ -292,19 +282,6 @@ class LocalNode(ManagedNode):
         self._discard(outcome)
 
 
-def _settle(gate: LifecycleGate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
-    """Open or close a gate, and the ports behind it, in the primary state ``state``."""
-    gate.state = state
-    if is_open:
-        gate.open()
-        for port in ports:
-            port.activate()
-        return
-    for port in ports:
-        port.deactivate()
-    gate.close()
-
-
 def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
     supervision = model.supervision
     max_errors = supervision.watch.max_errors
@@ -312,7 +289,3 @@ def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
         return None
     window_s = supervision.restart.window_ms / 1000.0
     return ErrorLimit(max_errors.value, window_s, partial(listener.on_fault, FaultKind.ERRORS))
-
-
-def _mutation_check(seen: MessageSnapshots | None, error_log: ErrorLog) -> MutationCheck | None:
-    return None if seen is None else MutationCheck(seen, error_log.error)

@@ -10,10 +10,9 @@ from typing import Any, TypeAlias
 from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter as RosParameter
 
-from composer.model import Component, LogLevel, Node
+from composer.model import SEVERITIES, Component, LogLevel, Node
 from composer.model.interface_packages import COMPOSITION, how_to_build
 from composer.model.lifecycle import ACTIVE, FINALIZED, UNCONFIGURED
-from composer.runtime.callbacks.log import severity
 from composer.runtime.children.command_line import remappings
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
@@ -277,7 +276,7 @@ def _load_request(node: Node, component: Component) -> _Message:
         plugin_name="" if component.plugin is None else component.plugin.value,
         node_name=node.ros_name.value,
         node_namespace=node.namespace.value,
-        log_level=0 if node.log_level is None else severity(node.log_level.value),
+        log_level=0 if node.log_level is None else SEVERITIES[node.log_level.value],
         remap_rules=list(remappings(node)),
         parameters=[
             parameter_message(parameter)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Set
 
 from rclpy.node import Node as RosNode
 
+from composer.base.characters import listed
 from composer.base.fast_dataclass import dataclass
 from composer.model import External, LogLevel, Node, Outside
 from composer.model.lifecycle import (
@@ -230,8 +231,7 @@ class ObservedNode(OutsideNode):
         names = [f"{port.kind} {port.full_name}" for port in self._presence.missing(self.earlier)]
         if not names:
             return "it is not in the ROS graph"
-        more = len(names) - _MAX_MISSING
-        return f"it has no {', '.join(names[:_MAX_MISSING])}" + f" and {more} more" * (more > 0)
+        return f"it has no {listed(names, _MAX_MISSING)}"
 
     @property
     def _service(self) -> str:

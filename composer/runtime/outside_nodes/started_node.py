@@ -13,9 +13,8 @@ from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 from composer.base.regular_files import write_whole
-from composer.model import Executable, ExecutableKind, LogLevel, Node, Outside
+from composer.model import SEVERITIES, Executable, ExecutableKind, LogLevel, Node, Outside
 from composer.model.lifecycle import INACTIVE, UNCONFIGURED
-from composer.runtime.callbacks.log import severity
 from composer.runtime.children.child_processes import Child, Command, StartFailed
 from composer.runtime.children.command_line import NotRunnable, make_command, parameter_file
 from composer.runtime.children.output import attribute_line
@@ -337,7 +336,7 @@ class ExecutableNode(StartedNode[Child]):
 
     def _log(self, text: str, is_error: bool) -> None:
         level, logger, message = attribute_line(text, (self._logger,), is_error=is_error)
-        if severity(level) >= severity(self._log_level):
+        if SEVERITIES[level] >= SEVERITIES[self._log_level]:
             self._listener.write_log(level, logger, printable(message))
 
 

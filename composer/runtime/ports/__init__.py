@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+
+from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
+
+#: The time limit of a call unless YAML sets one.
+DEFAULT_TIMEOUT_MS = 5000.0
 
 
 class RunningPort:
@@ -64,3 +69,27 @@ class PortSet:
     def always_on(self) -> tuple[RunningPort, ...]:
         """The ports and timers that work while the node is inactive, too."""
         return tuple(port for port in self.ports if port in self._always_on)
+
+
+async def deactivate(gate: LifecycleGate, ports: Iterable[RunningPort]) -> None:
+    """Stop receiving and cancel what is pending. Publishers stay open for last messages."""
+    gate.incoming = False
+    deactivated = tuple(ports)
+    for port in deactivated:
+        port.deactivate()
+    gate.cancel_pending()
+    for port in deactivated:
+        await port.drain()
+
+
+def settle(gate: LifecycleGate, state: str, is_open: bool, ports: Iterable[RunningPort]) -> None:
+    """Open or close a gate, and the ports behind it, in the primary state ``state``."""
+    gate.state = state
+    if is_open:
+        gate.open()
+        for port in ports:
+            port.activate()
+        return
+    for port in ports:
+        port.deactivate()
+    gate.close()

@@ -9,12 +9,12 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action.client import ActionClient
 
-from composer.base.fast_dataclass import dataclass
 from composer.behavior import CallError, GoalRejected
 from composer.model import Event, Port
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.user_code import queue_for
 from composer.runtime.executors.futures import Future, wrap_future
+from composer.runtime.ports.goals import GoalOutcome
 from composer.runtime.ports.services import CallingPort, CallLimit
 from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
@@ -26,14 +26,6 @@ _STATUS_NAMES = {
     GoalStatus.STATUS_CANCELED: "canceled",
     GoalStatus.STATUS_ABORTED: "aborted",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class GoalOutcome:
-    """How a goal ended; see :class:`composer.behavior.GoalResult`."""
-
-    status: str
-    result: Any
 
 
 class ClientGoal:
@@ -103,10 +95,6 @@ class ActionClientPort(CallingPort):
         limit_ms = self._timeout_ms if timeout_ms is None else timeout_ms
         return self._context.spawn(self._send_goal(goal, on_feedback, limit_ms))
 
-    def send(self, content: Any) -> None:
-        """Send a goal for a reaction; failures without ``on_failure`` are logged."""
-        self._context.spawn(self._send(content))
-
     def follow(self, outcome: Future[GoalOutcome], timeout_ms: float | None) -> Future[GoalOutcome]:
         """Wait for ``outcome`` for up to ``timeout_ms``, without canceling it."""
         limit = CallLimit(self._context, self._what, timeout_ms)
@@ -175,12 +163,9 @@ class ActionClientPort(CallingPort):
         response = await limit.wait_for_response(handle.cancel_goal_async())
         return bool(response.goals_canceling)
 
-    async def _send(self, goal: Any) -> None:
-        try:
-            sent = await self._send_goal(goal, None, self._timeout_ms)
-            await sent.result()
-        except CallError as error:
-            self._on_failure(error)
+    async def _complete(self, content: Any) -> None:
+        sent = await self._send_goal(content, None, self._timeout_ms)
+        await sent.result()
 
     def _on_feedback(self, goal: Any, on_feedback: OnFeedback | None, feedback: Any) -> None:
         if self._context.gate.incoming:

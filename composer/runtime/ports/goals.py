@@ -48,6 +48,14 @@ class Handlers:
     accept: Callable[[Any], Any] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class GoalOutcome:
+    """How a goal ended; see :class:`composer.behavior.GoalResult`."""
+
+    status: str
+    result: Any
+
+
 class GoalExecutor(RunningPort, Generic[G]):
     """Executes goals while the node is active, one at a time unless the port is reentrant.
 

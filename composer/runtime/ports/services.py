@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from math import inf
 from typing import Any, TypeVar
@@ -19,7 +20,7 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.executors.tracebacks import text_of
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
-from composer.runtime.ports import RunningPort
+from composer.runtime.ports import DEFAULT_TIMEOUT_MS, RunningPort
 from composer.runtime.ports.serving import Handler, RequestServer
 from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
@@ -75,8 +76,6 @@ class ServicePort(RequestServer):
 
 T = TypeVar("T")
 
-#: The time limit of a call unless YAML sets one.
-DEFAULT_TIMEOUT_MS = 5000.0
 #: rclpy does not notify when a server appears; polling costs microseconds.
 _POLL_PERIOD_S = 0.01
 
@@ -162,6 +161,20 @@ class CallingPort(RunningPort):
         """Run ``reaction`` on each ``event`` of the port, such as a response or a failure."""
         self._reactions[event] = reaction
 
+    def send(self, content: Any) -> None:
+        """Send a request or a goal for a reaction; failures without ``on_failure`` are logged."""
+        self._context.spawn(self._send(content))
+
+    @abstractmethod
+    async def _complete(self, content: Any) -> None:
+        """Send a request or a goal, and wait until it has ended. Raises CallError."""
+
+    async def _send(self, content: Any) -> None:
+        try:
+            await self._complete(content)
+        except CallError as error:
+            self._on_failure(error)
+
     def _check_type(self, content: Any, content_type: Any, expected: str) -> None:
         if not isinstance(content, content_type):
             raise TypeError(f"{self._label} takes a {expected}, not {type(content).__name__}")
@@ -222,10 +235,6 @@ class ClientPort(CallingPort):
             return wrap_future(called, self._on_failure)
         return self._call_local(server, request, limit_ms)
 
-    def send(self, content: Any) -> None:
-        """Send a request for a reaction; failures without ``on_failure`` are logged."""
-        self._context.spawn(self._send(content))
-
     def destroy(self) -> None:
         """Destroy the client."""
         self._context.loop.remove(self._client)
@@ -267,8 +276,5 @@ class ClientPort(CallingPort):
             return response
         return self._tap.follow(request, self._client.call_async(request))
 
-    async def _send(self, request: Any) -> None:
-        try:
-            await self._call(request, self._timeout_ms)
-        except CallError as error:
-            self._on_failure(error)
+    async def _complete(self, content: Any) -> None:
+        await self._call(content, self._timeout_ms)

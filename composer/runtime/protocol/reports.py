@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hmac
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import field
 
+from composer.base.characters import listed
 from composer.base.fast_dataclass import dataclass
 from composer.plan import STARTING, Condition
 
@@ -205,7 +206,7 @@ class SystemReport:
         missing = (Condition.ABSENT, STARTING)
         absent = [node.node for node in self.nodes if node.condition in missing]
         down = [node for node in self.nodes if node.held_down and node.node not in absent]
-        waiting = [f"waiting for {_listed(absent)}"] if absent else []
+        waiting = [f"waiting for {listed(absent, _MAX_LISTED)}"] if absent else []
         failed = [
             f"{node.node} is {node.condition or 'down'}" + f": {node.held_down}" * reasons
             for node in down
@@ -242,11 +243,6 @@ class SystemReport:
     def is_stopping(self) -> bool:
         """Whether it takes its nodes down because the process ends."""
         return self.activity in ("stopping", "stopped")
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
-    return f"{', '.join(names[:_MAX_LISTED])}{more}"
 
 
 def signed(document: str, key: str) -> str:

@@ -24,6 +24,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
+from composer.base.characters import listed
 from composer.model import ChannelKind, PortKind
 from composer.model.names import join_node_name
 from composer.runtime.middleware.local_resources import ended_participants
@@ -79,7 +80,10 @@ class Skipped:
 
     def warnings(self) -> tuple[str, ...]:
         """Return a warning for each reason."""
-        return tuple(f"skipped {_listed(list(found))}: {why}" for why, found in self._found.items())
+        return tuple(
+            f"skipped {listed(list(found), _MAX_LISTED)}: {why}"
+            for why, found in self._found.items()
+        )
 
 
 class RosGraph:
@@ -266,11 +270,6 @@ def _is_node(name: str, namespace: str) -> bool:
         return validate_node_name(name) and validate_namespace(namespace)
     except (NameValidationException, ValueError):
         return False
-
-
-def _listed(found: list[str]) -> str:
-    more = len(found) - _MAX_LISTED
-    return ", ".join(found[:_MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _actions() -> ModuleType:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
+from composer.base.characters import listed
 from composer.model import PrimaryState
 from composer.plan import (
     Condition,
@@ -213,8 +214,7 @@ class Supervisor:
 
     def _on_moved(self, moved: Sequence[NodeMoved]) -> None:
         causes = tuple(dict.fromkeys(item.cause for item in moved if item.cause))
-        more = f" and {len(causes) - _MAX_CAUSES} more" * (len(causes) > _MAX_CAUSES)
-        self.reconciler.reconcile_settled(", ".join(causes[:_MAX_CAUSES]) + more)
+        self.reconciler.reconcile_settled(listed(causes, _MAX_CAUSES))
 
     def restart(self, restarts: Iterable[Restart]) -> None:
         """Restart failed nodes together, unless requested transitions come first."""

@@ -43,7 +43,7 @@ class HostedActionServer(RunningPort):
         goal = instance.function(server._goal_callback, server, self._context)
         server.register_goal_callback(self._in_group(goal, self._accepts))
         cancel = instance.function(server._cancel_callback, server, self._context)
-        server.register_cancel_callback(self._in_group(cancel, _returns(CancelResponse.REJECT)))
+        server.register_cancel_callback(self._in_group(cancel, lambda _: CancelResponse.REJECT))
         accepted = instance.function(server._handle_accepted_callback, server, self._context)
         server.register_handle_accepted_callback(self._in_group(accepted, self._abort_accepted))
         # As in rclpy, the execution of a goal belongs to no callback group.
@@ -291,7 +291,3 @@ class GoalRequests:
         number = self._server.next_number()
         future.add_done_callback(lambda done: self._receive({kind: (number, done.result())}))
         return number
-
-
-def _returns(value: Any) -> Callable[[object], Any]:
-    return lambda _: value
