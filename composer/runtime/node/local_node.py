@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import replace
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 from rclpy.node import Node as RosNode
 
@@ -32,8 +32,6 @@ from composer.runtime.node.options import NodeOptions, make_ros_node, record_par
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time import NodeTime
 from composer.runtime.ports import PortSet, deactivate, settle
-
-T = TypeVar("T")
 
 
 class LibraryNode(Protocol):
