@@ -17,7 +17,6 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar, cast
 
 from composer.behavior import Logger
@@ -107,12 +106,7 @@ class BehaviorTest:
             self.transition("activate")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Deactivate, clean up and shut down, as the end of a system does."""
         try:
             for transition in ("deactivate", "cleanup", "shutdown"):

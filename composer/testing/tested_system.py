@@ -6,7 +6,6 @@ from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import ExitStack
 from math import inf
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from composer.bags.system_recording import SystemRecording
@@ -91,12 +90,7 @@ class TestedSystem:
     def _recording(self, folder: Path, clock: Clock) -> SystemRecording:
         return SystemRecording(self._system, Recording(), clock, self.recorded.append, folder)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Shut the system down. Raises TestFailure if it does not end."""
         with self._resources:
             self._run.end()

@@ -221,16 +221,15 @@ class QosEvents:
         while self._stop_watching:  # each holds a file descriptor
             self._stop_watching.pop()()
 
+    def _deadline(self, kind: IntEnum, verb: str) -> Iterator[EventKind]:
+        deadline_ms = self._port.qos.profile.deadline_ms
+        if deadline_ms is not None:
+            text = f"nothing was {verb} within its deadline of {deadline_ms:g} ms"
+            yield EventKind(_DEADLINE_MISSED, kind, text, period_s=deadline_ms / 1000.0)
+
     def _publisher_events(self) -> Iterator[EventKind]:
-        profile = self._port.qos.profile
-        if profile.deadline_ms is not None:
-            yield EventKind(
-                _DEADLINE_MISSED,
-                _PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED,
-                f"nothing was published within its deadline of {profile.deadline_ms:g} ms",
-                period_s=profile.deadline_ms / 1000.0,
-            )
-        lease_ms = profile.liveliness_lease_duration_ms
+        yield from self._deadline(_PUBLISHER.RCL_PUBLISHER_OFFERED_DEADLINE_MISSED, "published")
+        lease_ms = self._port.qos.profile.liveliness_lease_duration_ms
         if lease_ms is not None:
             yield EventKind(
                 _LIVELINESS_LOST,
@@ -240,15 +239,9 @@ class QosEvents:
             )
 
     def _subscription_events(self) -> Iterator[EventKind]:
-        profile = self._port.qos.profile
-        if profile.deadline_ms is not None:
-            yield EventKind(
-                _DEADLINE_MISSED,
-                _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED,
-                f"nothing was received within its deadline of {profile.deadline_ms:g} ms",
-                period_s=profile.deadline_ms / 1000.0,
-            )
-        lease_ms = profile.liveliness_lease_duration_ms
+        missed = _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED
+        yield from self._deadline(missed, "received")
+        lease_ms = self._port.qos.profile.liveliness_lease_duration_ms
         if lease_ms is not None:
             yield EventKind(
                 _LIVELINESS_CHANGED,
