@@ -23,8 +23,7 @@ from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tracebacks import exception_log
 from composer.runtime.host_options import HostOptions
-from composer.runtime.hosting.behavior_node import NodeOfBehavior
-from composer.runtime.hosting.hosted_node import HostedNode
+from composer.runtime.hosting.hosted_node import HostedNode, NodeOfBehavior
 from composer.runtime.intra_process.router import LocalRouter, shared_channels
 from composer.runtime.members.node import MemberNode
 from composer.runtime.members.other_processes import OtherProcesses
