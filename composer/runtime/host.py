@@ -3,8 +3,8 @@
 ::
 
     from composer.runtime.host import Host
-    from composer.runtime.host_options import HostOptions, TimeLimits
-    from composer.runtime.process import start_refused
+    from composer.runtime.host_options import HostOptions
+    from composer.runtime.process import StartRefused
 
     host = Host(system, bring_up(system), tear_down(system), HostOptions(run_for_s=5.0), report)
     try:

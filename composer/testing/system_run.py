@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import inf
-from pathlib import Path
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
@@ -23,7 +22,6 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.ros.messages import to_plain
 from composer.runtime.supervision.events import BroughtUp, Event, Logged, Outcome, Report
 from composer.runtime.supervision.virtual_time import ISOLATION
-from composer.testing.declarations import load_file
 from composer.testing.failures import LogLine, Received, TestFailure, Timeline, short
 from composer.testing.tester import TESTER
 
@@ -218,11 +216,3 @@ class SystemRun:
         except BaseException as error:  # raised again on the thread of the test
             self._error = error
             self.outcome = Outcome(1, str(error), self.now_s, ())
-
-
-def load_system(path: Path, arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> System:
-    """Return the model of a file, with values of arguments and of parameters (``node.name``).
-
-    Raises TestFailure with the diagnostics if the file has errors; the rules do not check it.
-    """
-    return load_file(path, arguments, settings)[0]

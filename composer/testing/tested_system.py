@@ -17,9 +17,10 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.node.managed_node import ManagedNode
 from composer.runtime.protocol.reports import ChainFigures
 from composer.runtime.supervision.events import Event, Outcome
+from composer.testing.declarations import load_file
 from composer.testing.failures import LogLine, Received, TestFailure, unknown, unmet
 from composer.testing.faults import Faults
-from composer.testing.system_run import Answer, Observation, SystemRun, load_system
+from composer.testing.system_run import Answer, Observation, SystemRun
 from composer.testing.tester import TESTER, Tester, port_to, with_tester
 
 T = TypeVar("T")
@@ -44,7 +45,7 @@ class TestedSystem:
     ) -> None:
         """Raise TestFailure if the file cannot be read or has errors."""
         if not isinstance(system, System):
-            system = load_system(Path(system), arguments or {}, settings or {})
+            system, _ = load_file(Path(system), arguments or {}, settings or {})
         self._tested = system
         self._system = with_tester(system)
         self._seed = seed

@@ -16,7 +16,6 @@ from functools import partial
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import PrimaryState
-from composer.model.lifecycle import FINALIZED
 from composer.plan import (
     blocked_nodes,
     optional_nodes,
@@ -24,7 +23,7 @@ from composer.plan import (
     start_causes,
     start_goals,
 )
-from composer.runtime.supervision.main_queue import Command, SupervisionContext
+from composer.runtime.supervision.main_queue import DOWN, Command, SupervisionContext
 from composer.runtime.supervision.supervisor import Supervisor
 
 _ACTIVITIES = {
@@ -34,8 +33,6 @@ _ACTIVITIES = {
     "reset": ("resetting", "reset"),
 }
 _RESTART = "restart"
-#: An error in a handler also ends in one of these states.
-_DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +108,7 @@ class Commands:
                 return f"{self.context.full_name(name)} hangs and cannot be restarted"
         for failure in self.supervisor.take_down(names, "restart requested"):
             name = failure.step.node
-            if name in names and self.context.node_set.nodes[name].state not in _DOWN:
+            if name in names and self.context.node_set.nodes[name].state not in DOWN:
                 return str(failure)
         goals = self._start_goals()
         started = {

@@ -229,7 +229,8 @@ class SupervisionContext:
         return self.node_set.nodes[name].full_name
 
 
-_DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
+#: The states of a node that is down: an error in a handler also ends in one of these.
+DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
 class SupervisionListener:
@@ -265,7 +266,7 @@ class SupervisionListener:
         if result.state == TRANSITIONS[result.transition].goal:
             goal = REACHED[result.transition]
             self._context.desired.update(lambda desired: desired.move(name, goal))
-        elif result.state in _DOWN:
+        elif result.state in DOWN:
             text = f"{result.transition} ended in an error: {result.reason}"
             serial = self._context.desired.update(lambda desired: desired.break_down(name)).serial
             return Fault(name, FaultKind.TRANSITION, text, serial)

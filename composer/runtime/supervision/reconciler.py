@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import partial
 
 from composer.model import OnFailure, PrimaryState
-from composer.model.lifecycle import FINALIZED
 from composer.plan import (
     Condition,
     Decision,
@@ -36,7 +35,7 @@ from composer.runtime.supervision.events import (
     RollingBack,
     Stuck,
 )
-from composer.runtime.supervision.main_queue import LoopRecovered, SupervisionContext
+from composer.runtime.supervision.main_queue import DOWN, LoopRecovered, SupervisionContext
 from composer.runtime.supervision.phases import ExecutionOptions, StepFailed
 from composer.runtime.supervision.plan_executor import PlanExecutor
 
@@ -198,9 +197,6 @@ class Reconciler:
             self.context.reporter.report(NodeTransitionFailed, *details)
 
 
-_DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
-
-
 class FaultHandler:
     """Takes failed nodes down, and restarts them, isolates them, or ends the system."""
 
@@ -296,11 +292,11 @@ class FaultHandler:
             case FaultKind.ABSENT:
                 return not self._context.node_set.nodes[fault.node].is_absent
             case FaultKind.TRANSITION:
-                return state not in _DOWN
+                return state not in DOWN
             case FaultKind.SILENCE | FaultKind.ERRORS:
                 return state != PrimaryState.ACTIVE
             case FaultKind.REPORTED:
-                return state in _DOWN
+                return state in DOWN
             case _:
                 return False
 
