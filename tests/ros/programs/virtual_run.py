@@ -10,11 +10,11 @@ import sys
 from pathlib import Path
 
 from composer.model import ChannelKind, channels
-from composer.testing.system_run import load_system
+from composer.testing.declarations import load_file
 from composer.testing.system_test import SystemTest
 
 path, seconds = sys.argv[1:]
-model = load_system(Path(path), {}, {})
+model, _ = load_file(Path(path), {}, {})
 all_channels = channels(model.nodes, with_transforms=True)
 topics = {channel.name for channel in all_channels if channel.kind is ChannelKind.TOPIC}
 with SystemTest(model) as system:
