@@ -29,7 +29,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock import Clock
 from composer.runtime.executors import readiness
 from composer.runtime.executors.base_loop import BaseLoop
-from composer.runtime.executors.readiness import Handle, SetCallback, Signal
+from composer.runtime.executors.readiness import RclSource, SetCallback
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ _RETRY_AFTER_S = 0.001
 LAST_RETRY_AFTER_S = 2.0
 
 
-class ActionSource:
+class ActionSource(RclSource):
     """Everything that an action server or client receives, one item at a time."""
 
     def __init__(
@@ -87,7 +87,7 @@ class ActionSource:
         self._role = _SERVER if isinstance(waitable, ActionServer) else _CLIENT
         setattr(waitable, self._role.unused_flag, False)
         self.may_skip = self._role is _CLIENT
-        self._handle: Handle = getattr(waitable, self._role.handle)
+        super().__init__(getattr(waitable, self._role.handle), *self._role.setters)
         self._executor = executor
         self._loop = loop
 
@@ -95,14 +95,6 @@ class ActionSource:
     def name(self) -> str:
         """The role and the action type."""
         return f"{self._role.name} of {self._waitable._action_type.__name__}"
-
-    def attach(self, signal: Signal) -> None:
-        """Signal all items of the action, except the statuses of goals."""
-        signal.attach(self._handle, *self._role.setters)
-
-    def detach(self, signal: Signal) -> None:
-        """Stop that."""
-        signal.detach(self._handle)
 
     def take(self) -> Any:
         """Return one item, by its kind."""

@@ -158,6 +158,24 @@ class EntitySource(Protocol):
         """Pass the item to its callback."""
 
 
+class RclSource:
+    """The part of a source that rcl signals: the handle of an entity, and how it is signaled."""
+
+    __slots__ = ("_handle", "_setters")
+
+    def __init__(self, handle: Handle, *setters: SetCallback) -> None:
+        self._handle = handle
+        self._setters = setters
+
+    def attach(self, signal: Signal) -> None:
+        """Make ``signal`` signal the items of the entity."""
+        signal.attach(self._handle, *self._setters)
+
+    def detach(self, signal: Signal) -> None:
+        """Stop that."""
+        signal.detach(self._handle)
+
+
 class SourceGroup:
     """Sources that share one signal. The loop serves them together, one item each."""
 

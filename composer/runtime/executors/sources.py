@@ -20,8 +20,15 @@ from typing import Any, Protocol
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.subscription import Subscription
 
-from composer.runtime.executors import readiness
-from composer.runtime.executors.readiness import EVENT, Signal, SourceGroup
+from composer.runtime.executors.readiness import (
+    EVENT,
+    MESSAGE,
+    REQUEST,
+    RESPONSE,
+    RclSource,
+    Signal,
+    SourceGroup,
+)
 from composer.runtime.executors.scheduler import Scheduler
 from composer.runtime.executors.tasks import name_of
 
@@ -47,13 +54,14 @@ def unused_callback(_: Any, response: Any) -> Any:
     return response
 
 
-class SubscriptionSource:
+class SubscriptionSource(RclSource):
     """Calls ``callback((message, information))`` for each message."""
 
     __slots__ = ("_subscription", "call", "take")
     may_skip = False
 
     def __init__(self, subscription: Subscription, callback: Callable[[Taken], object]) -> None:
+        super().__init__(subscription.handle, MESSAGE)
         self._subscription = subscription
         # Attributes, not methods: called per message, without a frame in between.
         self.call: Callable[[Taken], object] = callback
@@ -66,21 +74,14 @@ class SubscriptionSource:
         """The topic and the callback."""
         return f"subscription '{self._subscription.topic}' ({name_of(self.call)})"
 
-    def attach(self, signal: Signal) -> None:
-        """Signal messages."""
-        signal.attach(self._subscription.handle, readiness.MESSAGE)
 
-    def detach(self, signal: Signal) -> None:
-        """Stop that."""
-        signal.detach(self._subscription.handle)
-
-
-class ServiceSource:
+class ServiceSource(RclSource):
     """Calls ``callback(request, reply)`` for each request."""
 
     may_skip = False
 
     def __init__(self, service: Any, callback: Callable[[Any, Reply], object]) -> None:
+        super().__init__(service.handle, REQUEST)
         self._service = service
         self._callback = callback
 
@@ -88,14 +89,6 @@ class ServiceSource:
     def name(self) -> str:
         """The service and the callback."""
         return f"service '{self._service.srv_name}' ({name_of(self._callback)})"
-
-    def attach(self, signal: Signal) -> None:
-        """Signal requests."""
-        signal.attach(self._service.handle, readiness.REQUEST)
-
-    def detach(self, signal: Signal) -> None:
-        """Stop that."""
-        signal.detach(self._service.handle)
 
     def take(self) -> Any:
         """Return a request and its header."""
@@ -163,12 +156,13 @@ def rclpy_callback(service: Any, run_task: RunTask) -> Callable[[Any, Reply], No
     return call
 
 
-class ClientSource:
+class ClientSource(RclSource):
     """Completes the futures of ``client.call_async``."""
 
     may_skip = True
 
     def __init__(self, client: Any, executor: object) -> None:
+        super().__init__(client.handle, RESPONSE)
         self._client = client
         self._executor = executor
 
@@ -176,14 +170,6 @@ class ClientSource:
     def name(self) -> str:
         """The service."""
         return f"client of '{self._client.srv_name}'"
-
-    def attach(self, signal: Signal) -> None:
-        """Signal responses."""
-        signal.attach(self._client.handle, readiness.RESPONSE)
-
-    def detach(self, signal: Signal) -> None:
-        """Stop that."""
-        signal.detach(self._client.handle)
 
     def take(self) -> Any:
         """Return a response and its header."""
@@ -238,7 +224,7 @@ class EventCounts:
         return lambda: self._loop.remove_group(group)
 
 
-class _EventSource:
+class _EventSource(RclSource):
     """One kind of event of an endpoint. A group signals a new source once by itself."""
 
     may_skip = True
@@ -246,16 +232,13 @@ class _EventSource:
     def __init__(self, endpoint: Any, kind: IntEnum, callback: Callable[..., None]) -> None:
         with endpoint:
             self._event = rclpy_implementation.EventHandle(endpoint, kind)
+        super().__init__(self._event, EVENT)
         self._callback = callback
         self.name = kind.name
 
-    def attach(self, signal: Signal) -> None:
-        """Signal the event."""
-        signal.attach(self._event, EVENT)
-
     def detach(self, signal: Signal) -> None:
-        """Stop that and release the event."""
-        signal.detach(self._event)
+        """Signal nothing more, and release the event."""
+        super().detach(signal)
         self._event.destroy_when_not_in_use()
 
 
