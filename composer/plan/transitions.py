@@ -18,6 +18,7 @@ TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "clea
 
 
 _UPWARD = ("configure", "activate")
+_ACTIVE, _INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,9 +163,6 @@ def nodes_of(system: System, names: Iterable[str]) -> tuple[Node, ...]:
 
 
 _RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
-
-
-_ACTIVE, _INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
 
 
 def plan_transitions(

@@ -31,6 +31,7 @@ from composer.runtime.executors.strand import Work, in_steps
 from composer.runtime.metrics.statistics import ChainStatistics
 
 _MAX_IN_TRANSIT = 256  # messages from one node to the next; beyond, the oldest are forgotten
+_REMEMBERED = 32  # messages per node
 
 
 class Hop:
@@ -116,8 +117,6 @@ T = TypeVar("T")
 
 #: Called with (the callback, what it did).
 Report = Callable[[str, str], None]
-
-_REMEMBERED = 32  # messages per node
 
 
 class _Snapshot:

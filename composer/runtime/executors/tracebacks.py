@@ -46,6 +46,14 @@ USER_CODE_CALLERS: dict[int, CodeType] = {}
 INTERRUPTIBLE: dict[int, CodeType] = {}
 
 _READING = threading.RLock()
+#: The longest texts, in characters.
+_LINE_LENGTH = 1000
+_VALUE_LENGTH = 80
+_TRACEBACK_LENGTH = 20_000
+#: Begins the names of the packages that modules of behaviors are imported as.
+BEHAVIOR_PACKAGE = "_composer_behavior_"
+#: What Python puts before the names of the exceptions that these modules define.
+_IN_PACKAGE = re.compile(rf"\b{BEHAVIOR_PACKAGE}[0-9a-f]+\.")
 
 
 def calls_user_code(function: F) -> F:
@@ -151,16 +159,6 @@ def outward(frame: FrameType | None) -> Iterator[FrameType]:
     while frame is not None:
         yield frame
         frame = frame.f_back
-
-
-#: The longest texts, in characters.
-_LINE_LENGTH = 1000
-_VALUE_LENGTH = 80
-_TRACEBACK_LENGTH = 20_000
-#: Begins the names of the packages that modules of behaviors are imported as.
-BEHAVIOR_PACKAGE = "_composer_behavior_"
-#: What Python puts before the names of the exceptions that these modules define.
-_IN_PACKAGE = re.compile(rf"\b{BEHAVIOR_PACKAGE}[0-9a-f]+\.")
 
 
 def describe(error: BaseException) -> str:

@@ -32,13 +32,21 @@ from composer.runtime.node.interruption import RunningCallback, running_callback
 if TYPE_CHECKING:
     from composer.runtime.hosting.instance import Instance
 
+_STARTED_BY = "_composer_code"
+#: How often a group that has refused a callback is asked again. rclpy asks at each wake-up.
+_ASK_AGAIN_S = 0.01
+_PERIOD_S = 0.02
+#: How long a callback may go on when its node is cleaned up.
+_RETURN_WITHIN_S = 0.2
+#: Packages that create tasks for their own functions. These call code of the class as such.
+_OTHERS = frozenset({"composer", "rclpy"})
+
 
 class _Current(threading.local):
     instance: Instance | None = None
 
 
 _CURRENT = _Current()
-_STARTED_BY = "_composer_code"
 
 
 def current_instance() -> Instance | None:
@@ -100,8 +108,6 @@ class UserFunction:
         return self.instance is instance and function in (None, self)
 
 
-#: How often a group that has refused a callback is asked again. rclpy asks at each wake-up.
-_ASK_AGAIN_S = 0.01
 #: Another thread must not begin a callback between the two questions about one.
 _ASKING = threading.Lock()
 
@@ -266,15 +272,6 @@ class ThreadedCall:
             self._done.set_result(self._function())
         except BaseException as error:
             self._done.set_exception(error)
-
-
-_PERIOD_S = 0.02
-#: How long a callback may go on when its node is cleaned up.
-_RETURN_WITHIN_S = 0.2
-
-
-#: Packages that create tasks for their own functions. These call code of the class as such.
-_OTHERS = frozenset({"composer", "rclpy"})
 
 
 class InstanceExecutor(NodeExecutor):

@@ -36,6 +36,13 @@ from composer.runtime.protocol.reports import NodeReport, SystemReport, is_signe
 from composer.runtime.protocol.requests import NAME, STATE_TOPIC
 from composer.runtime.ros.service_requests import STATE_QOS
 
+#: Processes report every second. One that has not reported for this time is lost.
+REPORTS_WITHIN_S = 5.0
+_CHECK_PERIOD_S = 0.5
+_COUNTS = ("errors", "overruns", "queue_drops", "calls", "skipped")
+_COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
+_FIGURES = ("sent_hz", "received_hz", "busy", "slowest", "host", "pid", *_COUNTS, *_COUNTS_BY_NAME)
+
 
 class ProcessUnavailable(Exception):
     """The process cannot be started, or has ended; the text is the reason."""
@@ -70,14 +77,6 @@ class MemberContext:
         usual |= own_enclave(os.environ, self.full_name(process))
         environment = {name.value: value for name, value in process.environment}
         return Command(words, {**usual, **environment, REPORT_KEY_VARIABLE: report_key})
-
-
-#: Processes report every second. One that has not reported for this time is lost.
-REPORTS_WITHIN_S = 5.0
-_CHECK_PERIOD_S = 0.5
-_COUNTS = ("errors", "overruns", "queue_drops", "calls", "skipped")
-_COUNTS_BY_NAME = ("sent", "received", "dropped", "qos_events")
-_FIGURES = ("sent_hz", "received_hz", "busy", "slowest", "host", "pid", *_COUNTS, *_COUNTS_BY_NAME)
 
 
 @dataclass(slots=True)

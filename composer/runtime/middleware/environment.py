@@ -38,6 +38,30 @@ if TYPE_CHECKING:
 #: These say where others are found.
 _WHERE = ("ROS_DISCOVERY_SERVER", "ROS_STATIC_PEERS")
 _VARIABLES = (*_WHERE, "ROS_SUPER_CLIENT", "ROS_AUTOMATIC_DISCOVERY_RANGE")
+DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+_DISABLED = ("", "0", "false", "no", "off")
+#: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
+CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
+#: For ``rclpy.init``: without the log file of rcl, which would nearly always be empty.
+ROS_ARGUMENTS = ("--ros-args", "--disable-external-lib-logs")
+_PROFILE = Path(__file__).with_name("fast_dds.xml")
+_PROFILE_FOR_LARGE_SYSTEMS = Path(__file__).with_name("fast_dds_large.xml")
+_PROFILE_FOR_COMMANDS = Path(__file__).with_name("fast_dds_commands.xml")
+_PROFILE_FOR_COMMANDS_ON_LOCALHOST = Path(__file__).with_name("fast_dds_commands_localhost.xml")
+#: Read by Fast DDS 2 only; other middleware and later versions do not need the profile.
+PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_OTHER_VARIABLE = "FASTDDS_DEFAULT_PROFILES_FILE"
+_SERVER_VARIABLE = "ROS_DISCOVERY_SERVER"
+TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
+_UDP = "UDPv4"
+RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+#: Variables that the profile for localhost does not replace.
+_OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
+#: The names of profiles that are written at run time.
+_GENERATED = "fast_dds_"
+#: Fast DDS reads it from the current folder, also if there is a profile.
+_USER_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
+_SKIP_USER_FILE_VARIABLE = "SKIP_DEFAULT_XML_FILE"
 
 
 def use_discovery(discovery: Discovery | None, environment: MutableMapping[str, str]) -> None:
@@ -103,14 +127,6 @@ def _set_missing(variables: Mapping[str, str], environment: MutableMapping[str, 
     for name, value in variables.items():
         if not environment.get(name):
             environment[name] = value
-
-
-DISCOVERY_RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
-_DISABLED = ("", "0", "false", "no", "off")
-#: Tokens: https://docs.ros.org/en/jazzy/Tutorials/Demos/Logging-and-logger-configuration.html
-CONSOLE_FORMAT = "[{severity}] [{name}] {message}"
-#: For ``rclpy.init``: without the log file of rcl, which would nearly always be empty.
-ROS_ARGUMENTS = ("--ros-args", "--disable-external-lib-logs")
 
 
 def check_environment(environment: Mapping[str, str]) -> None:
@@ -241,26 +257,6 @@ _CHECKS = (
     _check_security,
     _check_middleware,
 )
-
-
-_PROFILE = Path(__file__).with_name("fast_dds.xml")
-_PROFILE_FOR_LARGE_SYSTEMS = Path(__file__).with_name("fast_dds_large.xml")
-_PROFILE_FOR_COMMANDS = Path(__file__).with_name("fast_dds_commands.xml")
-_PROFILE_FOR_COMMANDS_ON_LOCALHOST = Path(__file__).with_name("fast_dds_commands_localhost.xml")
-#: Read by Fast DDS 2 only; other middleware and later versions do not need the profile.
-PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
-_OTHER_VARIABLE = "FASTDDS_DEFAULT_PROFILES_FILE"
-_SERVER_VARIABLE = "ROS_DISCOVERY_SERVER"
-TRANSPORTS_VARIABLE = "FASTDDS_BUILTIN_TRANSPORTS"
-_UDP = "UDPv4"
-RANGE_VARIABLE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-#: Variables that the profile for localhost does not replace.
-_OTHER_RANGE_VARIABLES = ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
-#: The names of profiles that are written at run time.
-_GENERATED = "fast_dds_"
-#: Fast DDS reads it from the current folder, also if there is a profile.
-_USER_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
-_SKIP_USER_FILE_VARIABLE = "SKIP_DEFAULT_XML_FILE"
 
 
 def use_discovery_profile(environment: MutableMapping[str, str], folder: Path = Path()) -> None:

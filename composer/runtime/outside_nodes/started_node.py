@@ -30,6 +30,10 @@ from composer.runtime.outside_nodes.remote_node import NotAnswered
 
 #: The longest share of the time that is left for the shutdown of the system.
 END_SHARE = 0.5
+#: How long a killed process may take to disappear.
+_KILLED_WITHIN_S = 1.0
+#: How long after the first node of a program its other ones are in the graph, usually.
+_ALL_NODES_WITHIN_S = 1.0
 
 
 class Run(Protocol):
@@ -184,12 +188,6 @@ class StartedNode(ObservedNode, Generic[R]):
     def _on_settled(self) -> None:
         if self._started is not None and self._started.ended.done():
             self._on_end(self._started)
-
-
-#: How long a killed process may take to disappear.
-_KILLED_WITHIN_S = 1.0
-#: How long after the first node of a program its other ones are in the graph, usually.
-_ALL_NODES_WITHIN_S = 1.0
 
 
 class ExecutableNode(StartedNode[Child]):

@@ -18,6 +18,18 @@ from composer.model import Executor, ExecutorKind, Process
 from composer.runtime.clock import COMPUTER
 
 _REFUSED_WITHIN_S = 0.3
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+_MB = 1e6
+_MAX_BYTES = 4096  # more than it can be
+#: Fields of /proc/PID/stat after the name of the command; see proc(5).
+_UTIME, _STIME, _THREADS, _STARTED, _RSS = 11, 12, 17, 19, 21
+_PRIORITY_HINT = (
+    "it is allowed to root, with CAP_SYS_NICE, or up to the 'rtprio' of the user in"
+    " /etc/security/limits.conf"
+)
+#: Python's default is 5 ms.
+_SWITCH_INTERVAL_S = 0.001
 
 
 class PortState(Enum):
@@ -102,14 +114,6 @@ def _bind(address: str, port: int, family: int = socket.AF_INET) -> int | None:
     return None
 
 
-_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
-_MB = 1e6
-_MAX_BYTES = 4096  # more than it can be
-#: Fields of /proc/PID/stat after the name of the command; see proc(5).
-_UTIME, _STIME, _THREADS, _STARTED, _RSS = 11, 12, 17, 19, 21
-
-
 @dataclass(frozen=True, slots=True)
 class ProcessUsage:
     """What a process has used until ``at_s`` of the monotonic clock; ``up_s`` is its age."""
@@ -150,14 +154,6 @@ def process_start_s() -> float:
     """
     usage = process_usage("self")
     return COMPUTER.monotonic() - (0.0 if usage is None else max(0.0, usage.up_s))
-
-
-_PRIORITY_HINT = (
-    "it is allowed to root, with CAP_SYS_NICE, or up to the 'rtprio' of the user in"
-    " /etc/security/limits.conf"
-)
-#: Python's default is 5 ms.
-_SWITCH_INTERVAL_S = 0.001
 
 
 def switch_threads_sooner() -> None:

@@ -29,6 +29,11 @@ from composer.runtime.supervision.status import Status
 if TYPE_CHECKING:  # tests of the supervision run without ROS
     from composer.runtime.supervision.node_set import NodeSet
 
+#: What remains of any time limit after a second stop request.
+_URGENT_S = 0.05
+#: The states of a node that is down: an error in a handler also ends in one of these.
+DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
+
 
 class SharedDesiredState:
     """The current desired state. Thread-safe.
@@ -56,9 +61,6 @@ class SharedDesiredState:
 
 T = TypeVar("T")
 K = TypeVar("K")
-
-#: What remains of any time limit after a second stop request.
-_URGENT_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,10 +229,6 @@ class SupervisionContext:
     def full_name(self, name: str) -> str:
         """Return the full name of a node, by its key."""
         return self.node_set.nodes[name].full_name
-
-
-#: The states of a node that is down: an error in a handler also ends in one of these.
-DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
 
 
 class SupervisionListener:

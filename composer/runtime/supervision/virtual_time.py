@@ -35,6 +35,21 @@ from composer.runtime.supervision.node_set import NodeSet
 #: Nothing outside of the process takes part in a run.
 ISOLATION = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
 _MAX_REASONS = 5
+#: Of the signals of a standstill at one point in time, the one at which calls begin to be counted,
+#: and the one that ends the system: after 300 000 reads of the clock.
+_COUNTS_FROM = 50
+_ENDS_AT = 100
+_MAX_CALLBACKS = 5
+#: How often the turn is looked at, in seconds of real time.
+LOOK_S = 1.0
+#: The number of looks after which a callback is named, and after which it may be interrupted.
+_NAMED_AFTER, _INTERRUPTED_AFTER = 10, 2
+#: The number of looks after which a callback ends the run that has used no more CPU time between
+#: two looks.
+_ENDED_AFTER, _IDLE_S = 60, 0.01
+#: Code of debuggers, which wait for the user.
+_DEBUGGERS = ("bdb.py", "pydevd.py")
+_NANOSECONDS = 1_000_000_000
 
 
 def check_virtual_time(system: System) -> None:
@@ -69,13 +84,6 @@ def _kind_outside(node: Node) -> str | None:
     if node.component is not None:
         return "is a component"
     return None
-
-
-#: Of the signals of a standstill at one point in time, the one at which calls begin to be counted,
-#: and the one that ends the system: after 300 000 reads of the clock.
-_COUNTS_FROM = 50
-_ENDS_AT = 100
-_MAX_CALLBACKS = 5
 
 
 class Standstill:
@@ -124,17 +132,6 @@ class Standstill:
             return f"callbacks cause each other without end: {names}"
         places = ", ".join(sorted(self._places)[:_MAX_CALLBACKS])
         return f"a callback goes on without waiting{' at ' + places if places else ''}"
-
-
-#: How often the turn is looked at, in seconds of real time.
-LOOK_S = 1.0
-#: The number of looks after which a callback is named, and after which it may be interrupted.
-_NAMED_AFTER, _INTERRUPTED_AFTER = 10, 2
-#: The number of looks after which a callback ends the run that has used no more CPU time between
-#: two looks.
-_ENDED_AFTER, _IDLE_S = 60, 0.01
-#: Code of debuggers, which wait for the user.
-_DEBUGGERS = ("bdb.py", "pydevd.py")
 
 
 class TurnWatch:
@@ -216,9 +213,6 @@ def watched_time(
     Standstill(clock, node_set, fail)
     with outside_calls(warn), TurnWatch(clock, is_stopping, warn, fail):
         yield
-
-
-_NANOSECONDS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,7 @@ from composer.runtime.ros.messages import interface_class
 from composer.runtime.transforms.buffer import TransformBuffer
 
 _WARNING_PERIOD_S = 10.0
+_NANOSECONDS = 1_000_000_000
 
 
 class TransformListeners:
@@ -210,9 +211,6 @@ class _Topics:
             self.node.destroy_subscription(subscription)
 
         return end
-
-
-_NANOSECONDS = 1_000_000_000
 
 
 def nanoseconds(stamp: Any) -> int:
