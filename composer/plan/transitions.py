@@ -16,9 +16,9 @@ from composer.model.lifecycle import FINALIZED, TRANSITIONS
 
 TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "cleanup", "shutdown"]
 
-
 _UPWARD = ("configure", "activate")
 _ACTIVE, _INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
+_RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,9 +160,6 @@ def nodes_of(system: System, names: Iterable[str]) -> tuple[Node, ...]:
     """Return the nodes with the given names, in the order of the names."""
     found = (system.node(name) for name in names)
     return tuple(node for node in found if node is not None)
-
-
-_RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
 
 
 def plan_transitions(

@@ -23,6 +23,19 @@ from typing import Final, TypeVar
 
 T = TypeVar("T")
 
+#: Virtual time begins in September 2001: not at zero, which means in ROS that no time is known.
+START_NS: Final = 10**18
+_NANOSECONDS = 1_000_000_000
+#: A standstill is noticed each time that the clock was read so often at one point in time. A prime,
+#: so that it is noticed at each place of a loop.
+STANDSTILL_READS: Final = 2_999
+#: How often a system that has nothing to wait for looks for signals and other threads.
+_POLL_S = 0.001
+#: How often the main thread looks for signals while it waits for its turn, in real time.
+_SIGNALS_S = 0.1
+#: How long a thread that is interrupted waits for its turn, in real time.
+_INTERRUPTED_WITHIN_S = 1.0
+
 
 class Clock(ABC):
     """The time of a system, and waits for it. Any thread may call the methods."""
@@ -107,20 +120,6 @@ class RealClock(Clock):
 #: For what has the time of the computer even if a system has another one: files, other programs,
 #: sockets and the middleware.
 COMPUTER: Final = RealClock()
-
-
-#: Virtual time begins in September 2001: not at zero, which means in ROS that no time is known.
-START_NS: Final = 10**18
-_NANOSECONDS = 1_000_000_000
-#: A standstill is noticed each time that the clock was read so often at one point in time. A prime,
-#: so that it is noticed at each place of a loop.
-STANDSTILL_READS: Final = 2_999
-#: How often a system that has nothing to wait for looks for signals and other threads.
-_POLL_S = 0.001
-#: How often the main thread looks for signals while it waits for its turn, in real time.
-_SIGNALS_S = 0.1
-#: How long a thread that is interrupted waits for its turn, in real time.
-_INTERRUPTED_WITHIN_S = 1.0
 
 
 class _Waiting:

@@ -43,6 +43,10 @@ MATCH_FLAG: Final = bytearray(_SIZE)
 
 _ADDRESS = ctypes.addressof(ctypes.c_char.from_buffer(MATCH_FLAG))
 _ZERO = ctypes.cast(ctypes.CDLL(None).bzero, ctypes.c_void_p)
+_MIDDLEWARES = ("rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
+_TIMEOUT_S = 1.0
+_POLL_PERIOD_S = 0.0005
+TEST_NODE = "_compose_trial"
 
 
 class Matching:
@@ -113,12 +117,6 @@ def checked_match(publisher: Publisher, match: Callable[[], T]) -> T:
     MATCHING.is_supported = listener.is_supported and not MATCH_FLAG[0]
     listener.close()
     return matched
-
-
-_MIDDLEWARES = ("rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp")
-_TIMEOUT_S = 1.0
-_POLL_PERIOD_S = 0.0005
-TEST_NODE = "_compose_trial"
 
 
 class RmwSubscriptionOptions(ctypes.Structure):

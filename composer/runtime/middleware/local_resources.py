@@ -41,6 +41,31 @@ _FIRST_PARTICIPANT = 10
 _PORTS_OF_A_PARTICIPANT = 2
 #: Enough for announcements of some thousands of endpoints; Linux may limit it to less.
 _RECEIVE_BUFFER_BYTES = 4_194_304
+#: The prefix of a participant of Fast DDS: its vendor, the computer, and the lower half of the
+#: process id, with the lowest byte first.
+_FAST_DDS = b"\x01\x0f"
+_HOST, _PROCESS = slice(2, 4), slice(4, 6)
+_LOWER_HALF = 0xFFFF
+#: Where Linux keeps it; shm_open(3).
+SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is written there
+MEGABYTE = 1024 * 1024
+#: The segment of a process that sends large messages; otherwise it is 0.5 MB.
+LARGE_SEGMENT_BYTES = 16 * MEGABYTE
+#: Such a process needs that much: its other segments, and those of other processes, take the rest.
+MIN_FREE_BYTES = 2 * LARGE_SEGMENT_BYTES
+_PORT = re.compile(r"fastrtps_port(\d{1,9})", re.ASCII)
+_SEGMENT = re.compile(r"fastrtps_[0-9a-f]{16}", re.ASCII)
+_LOCK = "_el"  # the end of the name of its lock file
+#: A process locks the file right after it has created it.
+_LOCKED_WITHIN_S = 10.0
+#: As shm_open(3) opens it for a participant, and without waiting for the other end of a FIFO.
+_OPEN = os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
+#: The first word of a segment: uninitialized, initializing. 2 means initialized.
+_UNFINISHED = (0, 1)
+_WORD_BYTES = 4
+#: Filling a segment takes microseconds: after this time, its process was killed.
+_FILLED_WITHIN_S = 1.0
+_POLL_S = 0.02
 
 
 def count_participants(domain_id: int, table: Path = _TABLE) -> int:
@@ -88,13 +113,6 @@ def _open_sockets() -> list[int]:
     return [int(path.name) for path in folder.iterdir() if path.is_socket()]
 
 
-#: The prefix of a participant of Fast DDS: its vendor, the computer, and the lower half of the
-#: process id, with the lowest byte first.
-_FAST_DDS = b"\x01\x0f"
-_HOST, _PROCESS = slice(2, 4), slice(4, 6)
-_LOWER_HALF = 0xFFFF
-
-
 def ended_participants(known: Set[bytes], domain_id: int) -> frozenset[bytes]:
     """Return which of the ``known`` participants have ended, by their prefixes.
 
@@ -130,28 +148,6 @@ def _process(prefix: bytes) -> int | None:
     """Return the lower half of the id of the process of a participant, None if unknown."""
     is_known = prefix.startswith(_FAST_DDS)
     return int.from_bytes(prefix[_PROCESS], "little") if is_known else None
-
-
-#: Where Linux keeps it; shm_open(3).
-SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - nothing is written there
-MEGABYTE = 1024 * 1024
-#: The segment of a process that sends large messages; otherwise it is 0.5 MB.
-LARGE_SEGMENT_BYTES = 16 * MEGABYTE
-#: Such a process needs that much: its other segments, and those of other processes, take the rest.
-MIN_FREE_BYTES = 2 * LARGE_SEGMENT_BYTES
-_PORT = re.compile(r"fastrtps_port(\d{1,9})", re.ASCII)
-_SEGMENT = re.compile(r"fastrtps_[0-9a-f]{16}", re.ASCII)
-_LOCK = "_el"  # the end of the name of its lock file
-#: A process locks the file right after it has created it.
-_LOCKED_WITHIN_S = 10.0
-#: As shm_open(3) opens it for a participant, and without waiting for the other end of a FIFO.
-_OPEN = os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
-#: The first word of a segment: uninitialized, initializing. 2 means initialized.
-_UNFINISHED = (0, 1)
-_WORD_BYTES = 4
-#: Filling a segment takes microseconds: after this time, its process was killed.
-_FILLED_WITHIN_S = 1.0
-_POLL_S = 0.02
 
 
 def remove_incomplete_ports(domain_id: int, folder: Path = SHARED_MEMORY) -> None:

@@ -46,6 +46,8 @@ _BY_DURING = {item.during: name for name, item in TRANSITIONS.items()}
 _AFTER_ERROR = "errorprocessing"
 _POLL_S = 0.02
 _MAX_MISSING = 3
+#: How often an external node is looked for.
+PERIOD_S = 0.5
 
 
 class TransitionRefused(Exception):
@@ -258,10 +260,6 @@ def elsewhere_text(model: Node, names: Set[str]) -> str:
     keys = [f"'name: {name}'"] if name != model.ros_name.value else []
     keys += [f"'namespace: {namespace}'"] if namespace != model.namespace.value else []
     return f"; there is {shown[0]} instead: write {' and '.join(keys)}"
-
-
-#: How often an external node is looked for.
-PERIOD_S = 0.5
 
 
 class ExternalNode(ObservedNode):

@@ -25,6 +25,11 @@ from composer.runtime.ports.serving import Handler, RequestServer
 from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
 
+T = TypeVar("T")
+
+#: rclpy does not notify when a server appears; polling costs microseconds.
+_POLL_PERIOD_S = 0.01
+
 
 class ServicePort(RequestServer):
     """A server with a service of rclpy."""
@@ -72,12 +77,6 @@ class ServicePort(RequestServer):
 
     def _destroy_service(self) -> None:
         self._context.node.destroy_service(self._service)
-
-
-T = TypeVar("T")
-
-#: rclpy does not notify when a server appears; polling costs microseconds.
-_POLL_PERIOD_S = 0.01
 
 
 class CallLimit:

@@ -27,6 +27,10 @@ P = TypeVar("P", bound=Enum)
 _NANOSECONDS = 1e6  # per millisecond
 #: Durations above are rmw's infinite duration: no limit.
 _NO_LIMIT_MS = 1e12
+NOT_SET = "not set"
+_TYPES = {RosParameter.Type.NOT_SET.value: NOT_SET} | {
+    RosParameter.Type[kind.name].value: kind.value for kind in ParameterType
+}
 
 
 def rclpy_profile(profile: QosProfile) -> QoSProfile:
@@ -82,12 +86,6 @@ def _duration(milliseconds: float | None) -> Duration:
 def _milliseconds(duration: Any) -> float | None:
     milliseconds = duration.nanoseconds / _NANOSECONDS
     return None if milliseconds >= _NO_LIMIT_MS else milliseconds
-
-
-NOT_SET = "not set"
-_TYPES = {RosParameter.Type.NOT_SET.value: NOT_SET} | {
-    RosParameter.Type[kind.name].value: kind.value for kind in ParameterType
-}
 
 
 def plain_value(value: ParameterValue) -> Any:

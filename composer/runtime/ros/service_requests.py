@@ -49,6 +49,12 @@ MAX_PARAMETERS = 1000
 MAX_ITEMS = 1_000_000
 #: Characters of a label of a transition, or of the name of a type: names are shorter.
 MAX_CHARACTERS = 1000
+#: Carries documents of the protocol.
+RequestService = SetParametersAtomically
+#: Transient local: a late joiner gets the last message at once.
+STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+CALLBACKS_QOS = QoSProfile(depth=10)
+_PARAMETER = "request"
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,16 +192,6 @@ def _respond(callback: Any, request: Any, response: Any) -> Any:
     response.successful = False
     response.failure_reason = request.reason
     return response
-
-
-#: Carries documents of the protocol.
-RequestService = SetParametersAtomically
-
-#: Transient local: a late joiner gets the last message at once.
-STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-CALLBACKS_QOS = QoSProfile(depth=10)
-
-_PARAMETER = "request"
 
 
 def request_message(request: Any) -> SetParametersAtomically.Request:
