@@ -17,7 +17,7 @@ from composer.model.names import is_hidden
 from composer.model.qos import QosProfile, incompatibilities, strictest_compatible
 from composer.model.recording import owner_of_topic
 from composer.runtime.ros.conversions import rclpy_profile
-from composer.runtime.ros_graph.endpoints import TopicInfo, topic_info
+from composer.runtime.ros.endpoints import TopicInfo, topic_info
 
 #: Latched messages of a topic, and what arrives while this program is busy.
 _DEPTH = 1000

@@ -12,7 +12,7 @@ from composer.base.diagnostics import nearest_full_name
 from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.model.names import is_hidden, is_selected, topic_name_problem
 from composer.runtime.protocol.requests import NameAndTypes, visible_names
-from composer.runtime.ros_graph.endpoints import details
+from composer.runtime.ros.endpoints import details
 
 T = TypeVar("T")
 

@@ -21,7 +21,7 @@ from rclpy.task import Future
 from composer.client.graph_names import type_mismatch_hint
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.model.names import join_node_name
-from composer.runtime.ros_graph.graph import participant, servers_of
+from composer.runtime.ros.graph import participant, servers_of
 
 _RETRY_AFTER_S = 1.0
 #: A process that does not respond for so long is busy, and has discovered the client long ago.

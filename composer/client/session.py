@@ -25,7 +25,7 @@ from composer.runtime.middleware.local_resources import count_participants, enla
 from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.requests import NAME
-from composer.runtime.ros_graph.graph import (
+from composer.runtime.ros.graph import (
     COMMAND_PREFIX,
     SETTLE_S,
     NodeName,

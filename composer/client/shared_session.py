@@ -17,7 +17,7 @@ from composer.client.messages.values import class_of
 from composer.client.session import Deadline, Session
 from composer.model.qos import QosProfile
 from composer.runtime.ros.conversions import rclpy_profile
-from composer.runtime.ros_graph.graph import GraphChanges
+from composer.runtime.ros.graph import GraphChanges
 
 InvalidHandle = rclpy_implementation.InvalidHandle
 _WAIT_S = 0.02

@@ -17,8 +17,8 @@ from composer.model.interface_packages import COMPOSITION
 from composer.model.names import is_hidden
 from composer.plan.drift import ObservedNode, Snapshot
 from composer.runtime.ros.conversions import plain_value
+from composer.runtime.ros.endpoints import endpoints, node_names, visible_topics
 from composer.runtime.ros.messages import MessageError, interface_class
-from composer.runtime.ros_graph.endpoints import endpoints, node_names, visible_topics
 
 #: How long to wait for the responses of nodes; later ones count as unknown.
 _RESPONSE_S = 2.0

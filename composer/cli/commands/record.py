@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from composer.bags.recorder import Recorder
     from composer.bags.writer import BagWriter
     from composer.client.session import Deadline, Session
-    from composer.runtime.ros_graph.endpoints import TopicInfo
+    from composer.runtime.ros.endpoints import TopicInfo
 
 EPILOG = examples(
     "compose record                               all topics, until Ctrl-C",

@@ -18,8 +18,8 @@ from composer.client.session import Deadline, Session
 from composer.model.qos import incompatibilities
 from composer.runtime.intra_process.dds_flags import unsupported_reason
 from composer.runtime.middleware.environment import ROS_ARGUMENTS
+from composer.runtime.ros.endpoints import EndpointInfo, TopicInfo, topic_info
 from composer.runtime.ros.messages import MessageError, interface_class
-from composer.runtime.ros_graph.endpoints import EndpointInfo, TopicInfo, topic_info
 
 _TESTED_MIDDLEWARE = "rmw_fastrtps_cpp"
 #: Fast DDS repeats the announcement of a participant every 3 s.

@@ -24,7 +24,7 @@ from composer.client.shared_session import Sample, SampledTopic
 from composer.model.qos import Durability, QosProfile, strictest_compatible
 from composer.runtime.metrics.figures import MessageRate
 from composer.runtime.ros.conversions import rclpy_profile
-from composer.runtime.ros_graph.endpoints import topic_info
+from composer.runtime.ros.endpoints import topic_info
 
 SUBSCRIPTION_DEPTH = 1000
 #: Messages that a command takes at once: they may be large.

@@ -20,9 +20,9 @@ from composer.client.systems.local_queries import nodes_with
 from composer.client.systems.managers import Systems
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.requests import NAME, REQUEST, CallNodes, NodeCall
+from composer.runtime.ros.graph import is_valid_name
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.ros.service_requests import RequestService, read_answer, request_message
-from composer.runtime.ros_graph.graph import is_valid_name
 
 #: Managers publish their last report to each new subscription, and again every second.
 _REPORT_WITHIN_S = 2.0

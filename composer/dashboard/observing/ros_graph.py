@@ -17,8 +17,8 @@ from composer.dashboard.observing.reports import SystemReports
 from composer.dashboard.observing.topics import TopicMeters, TopicReader
 from composer.dashboard.observing.topology import Topology
 from composer.plan.drift import ObservedEndpoint
-from composer.runtime.ros_graph.endpoints import endpoints
-from composer.runtime.ros_graph.graph import SETTLE_S
+from composer.runtime.ros.endpoints import endpoints
+from composer.runtime.ros.graph import SETTLE_S
 
 if TYPE_CHECKING:
     from composer.client.shared_session import SharedSession

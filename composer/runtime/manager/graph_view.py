@@ -34,8 +34,8 @@ from composer.runtime.protocol.requests import (
     StatusQuery,
 )
 from composer.runtime.ros.conversions import plain_value
-from composer.runtime.ros_graph.endpoints import details, endpoints, node_names
-from composer.runtime.ros_graph.graph import SETTLE_S, GraphChanges, RosGraph
+from composer.runtime.ros.endpoints import details, endpoints, node_names
+from composer.runtime.ros.graph import SETTLE_S, GraphChanges, RosGraph
 
 #: How long to wait for a process that has just started; commands wait longer than that.
 _COMPLETE_WITHIN_S = 0.4

@@ -46,6 +46,7 @@ from composer.runtime.protocol.requests import (
     Restart,
     SaveRecording,
 )
+from composer.runtime.ros.graph import GraphChanges
 from composer.runtime.ros.service_requests import (
     RequestService,
     answer_message,
@@ -53,7 +54,6 @@ from composer.runtime.ros.service_requests import (
     limited,
     read_request,
 )
-from composer.runtime.ros_graph.graph import GraphChanges
 from composer.runtime.supervision.main_queue import Command
 from composer.runtime.transforms.listener import TransformListeners
 

@@ -21,7 +21,7 @@ from composer.runtime.executors.sources import Reply, unused_callback
 from composer.runtime.executors.tasks import sleep, within
 from composer.runtime.protocol.codec import ProtocolError, decode, encode
 from composer.runtime.protocol.requests import INSTANCE_PREFIX, IS_ACTIVE, Instance
-from composer.runtime.ros_graph.graph import GraphChanges, participant, servers_of
+from composer.runtime.ros.graph import GraphChanges, participant, servers_of
 
 #: Discovery of another participant takes up to three seconds; later, this system is not refused.
 START_S = 5.0

@@ -30,8 +30,8 @@ from composer.runtime.executors.loop import Loop
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import AskReportKey, ChangeStates, Step, StepResult
+from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.service_requests import RequestService, read_answer, request_message
-from composer.runtime.ros_graph.graph import participant, servers_of
 
 _MAX_STEPS = 500  # per request; a service takes a million characters
 MAX_REQUESTS = 8

@@ -18,7 +18,7 @@ from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep, wait_for
 from composer.runtime.middleware.local_resources import is_in_group
-from composer.runtime.ros_graph.graph import RosGraph, clients_of, participant, servers_of
+from composer.runtime.ros.graph import RosGraph, clients_of, participant, servers_of
 
 #: Topics that nearly every node publishes.
 _PARAMETER_EVENTS = "/parameter_events"  # each node has a publisher of its own

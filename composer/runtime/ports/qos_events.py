@@ -33,7 +33,7 @@ from composer.runtime.intra_process.topic import (
     Receiver,
 )
 from composer.runtime.metrics.repeat_limit import RepeatLimit
-from composer.runtime.ros_graph.endpoints import EndpointInfo, topic_info
+from composer.runtime.ros.endpoints import EndpointInfo, topic_info
 
 _CHECK_PERIOD_S = 0.1
 _CHECKS = 20

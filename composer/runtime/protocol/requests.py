@@ -72,7 +72,7 @@ class NodesQuery:
 
 @dataclass(frozen=True, slots=True)
 class DetailsAnswer:
-    """A node, topic or action with its endpoints, as ``ros_graph/endpoints.py`` has them."""
+    """A node, topic or action with its endpoints, as ``ros/endpoints.py`` has them."""
 
     details: Mapping[str, Any]
 

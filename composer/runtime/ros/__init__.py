@@ -1,1 +1,1 @@
-"""Message classes, QoS profiles, and the services that every node has, as rclpy has them."""
+"""Message classes, QoS profiles, the services that every node has, and the graph, in rclpy."""

@@ -15,7 +15,7 @@ from composer.model.names import is_hidden, join_node_name, split_node_name
 from composer.model.qos import QosProfile
 from composer.plan.drift import ObservedEndpoint
 from composer.runtime.ros.conversions import discovered_profile
-from composer.runtime.ros_graph.graph import PARTICIPANT_BYTES, UNKNOWN_NODE, NodeName, RosGraph
+from composer.runtime.ros.graph import PARTICIPANT_BYTES, UNKNOWN_NODE, NodeName, RosGraph
 
 
 @dataclass(frozen=True, slots=True)
