@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from composer.client.session import Session
 from composer.client.systems.local_queries import local_endpoints, local_parameters
-from composer.runtime.ros_graph.endpoints import endpoints
+from composer.runtime.ros.endpoints import endpoints
 from tests.ros.support.commands import Running, running
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.system_process import write_system

@@ -26,13 +26,13 @@ from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import ChangeStates, StepResult, StepResults
+from composer.runtime.ros.graph import participant, servers_of
 from composer.runtime.ros.service_requests import (
     STATE_QOS,
     RequestService,
     answer_message,
     read_request,
 )
-from composer.runtime.ros_graph.graph import participant, servers_of
 from composer.runtime.supervision.status import Status
 from tests.ros.support.in_process import system_of, wait_until
 from tests.ros.support.loops import Bench, bench

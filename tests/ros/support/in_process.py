@@ -37,7 +37,7 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.middleware.local_resources import remove_incomplete_ports
 from composer.runtime.node.node import RunningNode
 from composer.runtime.protocol.reports import ChainFigures, SystemReport
-from composer.runtime.ros_graph.graph import servers_of
+from composer.runtime.ros.graph import servers_of
 from composer.runtime.supervision.events import (
     BroughtUp,
     Event,

@@ -18,7 +18,7 @@ from rclpy.action import ActionClient, ActionServer
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from composer.runtime.ros_graph.graph import participant, servers_of
+from composer.runtime.ros.graph import participant, servers_of
 
 _REPEAT_AFTER_S = 0.5
 #: Names of service types that change nothing begin with these.

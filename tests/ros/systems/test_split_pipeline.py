@@ -23,8 +23,8 @@ from rclpy.qos import QoSPresetProfiles
 from composer.client.systems.local_queries import local_report
 from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.instance_lock import local_systems
-from composer.runtime.ros_graph.endpoints import endpoints, node_names
-from composer.runtime.ros_graph.graph import RosGraph, participant
+from composer.runtime.ros.endpoints import endpoints, node_names
+from composer.runtime.ros.graph import RosGraph, participant
 from tests.ros.support.commands import (
     COMPOSE,
     code_of_end,
