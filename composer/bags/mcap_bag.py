@@ -32,7 +32,7 @@ from composer.bags.bag import (
     reading,
 )
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import open_regular
+from composer.base.files import open_regular
 
 #: A longer record is taken for damage.
 _LONGEST_RECORD_BYTES = 2**30

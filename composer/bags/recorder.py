@@ -13,8 +13,10 @@ from typing import Any, Protocol
 
 from rclpy.serialization import serialize_message
 
-from composer.bags.bag import BagError, BagMessage, BagTopic
-from composer.runtime.clock import Clock
+from composer.bags.bag import NANOSECONDS, BagError, BagMessage, BagTopic
+from composer.bags.writer import BagWriter
+from composer.model.qos import Durability
+from composer.runtime.clock.clock import Clock
 
 _SERIALIZE_PERIOD_S = 0.02
 _WRITE_PERIOD_S = 0.1
@@ -23,6 +25,8 @@ LARGEST_PENDING_BYTES = 256_000_000
 #: Messages of one source that wait to be serialized.
 _LARGEST_QUEUE_BYTES = 64_000_000
 _SHORTEST_QUEUE, _LONGEST_QUEUE = 16, 10_000
+#: The memory for the messages of a system; the oldest are discarded earlier if need be.
+LARGEST_BYTES = 256_000_000
 
 
 class Sink(Protocol):
@@ -216,3 +220,55 @@ class Recorder:
             _, function = self._calls.popleft()
             with self._writing:
                 function()
+
+
+class Ring:
+    """Keeps the messages of the last ``seconds``, and the last one of each latched topic."""
+
+    def __init__(self, seconds: float) -> None:
+        self._length_ns = round(seconds * NANOSECONDS)
+        self._topics: dict[str, BagTopic] = {}
+        self._messages: deque[BagMessage] = deque()
+        self._latched: dict[str, BagMessage] = {}
+        self._size_bytes = 0
+
+    def add_topic(self, topic: BagTopic) -> None:
+        """Declare a topic."""
+        self._topics[topic.name] = topic
+
+    def write(self, message: BagMessage) -> None:
+        """Keep a message."""
+        self._messages.append(message)
+        self._size_bytes += message.memory_bytes
+        oldest_ns = message.recorded_ns - self._length_ns
+        while self._messages[0].recorded_ns < oldest_ns or self._size_bytes > LARGEST_BYTES:
+            self._discard()
+
+    def flush_if_due(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def save(self, writer: BagWriter) -> None:
+        """Write what is kept, and keep it no longer: each message is written once.
+
+        Latched messages from before are written with the time of the oldest message. Raises
+        BagError.
+        """
+        for topic in self._topics.values():
+            writer.add_topic(topic)
+        if self._messages:
+            start_ns = self._messages[0].recorded_ns
+            for message in self._latched.values():
+                writer.write(message._replace(recorded_ns=start_ns))
+        while self._messages:
+            writer.write(self._messages[0])
+            self._discard()
+
+    def _discard(self) -> None:
+        message = self._messages.popleft()
+        self._size_bytes -= message.memory_bytes
+        profiles = self._topics[message.topic].qos
+        if any(item.durability is Durability.TRANSIENT_LOCAL for item in profiles):
+            self._latched[message.topic] = message

@@ -22,7 +22,7 @@ from composer.bags.bag import (
     joined,
     reading,
 )
-from composer.base.regular_files import read_regular
+from composer.base.files import read_regular
 
 #: In metadata.yaml: that each message is compressed, of which the databases know nothing.
 _COMPRESSED_MESSAGES = re.compile(

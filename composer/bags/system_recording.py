@@ -12,8 +12,7 @@ from time import strftime
 from composer import version
 from composer.bags.bag import Attachment, BagError, BagTopic
 from composer.bags.definitions import full_definition
-from composer.bags.recorder import Recorder, Source
-from composer.bags.ring import Ring
+from composer.bags.recorder import Recorder, Ring, Source
 from composer.bags.writer import BagWriter, split_limits
 from composer.interfaces import Interfaces
 from composer.model import System

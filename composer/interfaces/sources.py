@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import NotRegularError, read_regular
-from composer.base.resources import ament_prefixes
+from composer.base.files import NotRegularError, read_regular
+from composer.base.folders import ament_prefixes
 from composer.interfaces.definitions import Field, FieldType, Interface, Message, interface_of
 from composer.interfaces.parser import split_name
 from composer.language.tree import Plain

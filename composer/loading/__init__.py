@@ -29,10 +29,9 @@ from composer.language.rules import MISSING_VARIABLE
 from composer.language.schema import kind_of, kinds
 from composer.language.tree import Entry
 from composer.language.tree_values import word
-from composer.loading.combinations import Checked, joined_diagnostics
 from composer.loading.merging import Definitions, Document, read, real_folder
 from composer.loading.reported import Identity, LoadResult, identity, may_be_included
-from composer.loading.variants import Resolved, resolve_file
+from composer.loading.variants import Checked, Resolved, joined_diagnostics, resolve_file
 from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, read_overrides
 from composer.project.settings import apply_rule_settings, check_rule_settings

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from composer.base.diagnostics import Diagnostic, has_errors, in_order
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import read_regular
+from composer.base.files import read_regular
 from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
 from composer.language.document.limits import MAX_BYTES

@@ -6,7 +6,7 @@ the nearest ``nodes`` folder, else above the nearest ``interfaces`` folder, else
 symbolic links.
 
 The search ends where it finds something that belongs to another user: see
-:mod:`composer.base.ownership`.
+:mod:`composer.base.folders`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, shown
 from composer.base.fast_dataclass import dataclass
-from composer.base.ownership import SAFE_FOLDERS_VARIABLE, TrustedUsers
-from composer.base.resources import data_folder
+from composer.base.folders import SAFE_FOLDERS_VARIABLE, TrustedUsers, data_folder
 from composer.base.source import SourceFile, Span, shown_path
 from composer.project.settings import (
     FOREIGN_OWNER,

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import open_regular, read_regular
+from composer.base.files import open_regular, read_regular
 
 _MAX_PATTERN_BYTES = 1_000_000
 _GIT_WORD = re.compile(

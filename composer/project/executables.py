@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.base.resources import ament_prefixes
+from composer.base.folders import ament_prefixes
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution

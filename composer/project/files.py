@@ -11,7 +11,7 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import open_regular
+from composer.base.files import open_regular
 from composer.base.source import SourceFile, Span
 from composer.language.rules import UNREADABLE_FILE
 from composer.project import SETTINGS_FILE, Project

@@ -15,8 +15,7 @@ from dataclasses import field
 from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.ownership import TrustedUsers
-from composer.base.resources import ament_prefixes, interfaces_folder, nodes_folder
+from composer.base.folders import TrustedUsers, ament_prefixes, interfaces_folder, nodes_folder
 from composer.base.source import Span
 from composer.project import Project
 

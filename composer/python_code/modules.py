@@ -15,8 +15,8 @@ from pathlib import Path
 
 from composer.base.diagnostics import nearest
 from composer.base.fast_dataclass import dataclass
-from composer.base.ownership import TrustedUsers
-from composer.base.regular_files import FileTooLargeError, NotRegularError, read_regular
+from composer.base.files import FileTooLargeError, NotRegularError, read_regular
+from composer.base.folders import TrustedUsers
 from composer.base.source import Span
 from composer.project import Project
 

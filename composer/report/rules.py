@@ -12,7 +12,7 @@ import composer.model.resolve
 import composer.rules
 from composer.base.diagnostics import Diagnostic, Rule, registered_rules, suggestion
 from composer.base.fast_dataclass import dataclass
-from composer.base.resources import rules_folder
+from composer.base.folders import rules_folder
 
 
 def all_rules() -> tuple[Rule, ...]:

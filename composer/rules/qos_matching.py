@@ -10,7 +10,7 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, error, warning
 from composer.base.fast_dataclass import dataclass
-from composer.base.resources import nodes_folder
+from composer.base.folders import nodes_folder
 from composer.base.source import Span
 from composer.model import Channel, ChannelKind, Node, Port, PortOfNode
 from composer.model.qos import (

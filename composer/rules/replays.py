@@ -12,7 +12,7 @@ from typing import Any
 
 from composer.base.diagnostics import Diagnostic, Label, suggestion
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import read_regular
+from composer.base.files import read_regular
 from composer.base.source import Located
 from composer.language.document import parse_bytes
 from composer.language.document.limits import MAX_BYTES

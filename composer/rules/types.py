@@ -13,7 +13,7 @@ from composer.interfaces.field_types.types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
 from composer.model.names import join
 from composer.rules.analysis.context import Context
-from composer.rules.analysis.fields import field_problems
+from composer.rules.analysis.expressions import field_problems
 from composer.rules.analysis.formatting import port_name
 from composer.rules.analysis.subjects import connection_subjects, port_subject, type_subject
 

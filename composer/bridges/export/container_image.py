@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.resources import data_folder
+from composer.base.folders import data_folder
 from composer.bridges.export.deployment import (
     STOP_WITHIN_S,
     Service,

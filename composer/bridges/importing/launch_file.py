@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.base.characters import escape_lines
-from composer.bridges.importing.found import FoundNode, FoundParameter, FoundSystem
+from composer.bridges.importing import FoundNode, FoundParameter, FoundSystem
 from composer.language.document.scalars import NumberRefused, resolve_plain
 from composer.language.expressions import ExpressionError, compile_expression
 from composer.language.tree import Plain

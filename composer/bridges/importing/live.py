@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
+from composer.bridges.importing import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.language.tree import Plain
 from composer.model import USE_SIM_TIME, PortKind
 from composer.model.names import is_selected, split_node_name, topic_name_problem

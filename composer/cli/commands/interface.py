@@ -158,7 +158,7 @@ def _check(folders: tuple[Path, ...], packages: dict[str, Path | None]) -> None:
     """Check the definitions of the packages as 'compose validate' does. Raises typer.Exit."""
     from composer.interfaces import Interfaces
     from composer.report.text import render
-    from composer.rules.interfaces import invalid_definitions
+    from composer.rules.ports import invalid_definitions
 
     own = [name for name, folder in packages.items() if folder is not None]
     diagnostics = list(invalid_definitions(Interfaces.load(folders), own))
@@ -252,23 +252,23 @@ def complete_package(name: str, folder: Path | None, target: Path, *, for_pip: b
     Without a folder, it is a package of ROS whose definitions come with the composer. Unless it has
     to be built with pip, what pip needs may be left out.
     """
-    from composer.bridges.scaffolding import interface_package as package_files
+    from composer.bridges import scaffolding
 
     try:
         package = (
-            package_files.bundled_package(name)
+            scaffolding.bundled_package(name)
             if folder is None
-            else package_files.read_package(name, folder)
+            else scaffolding.read_package(name, folder)
         )
         try:
             files = package.files(wheel_versions())
-        except package_files.NotForPip as error:
+        except scaffolding.NotForPip as error:
             if for_pip:
                 hint = f"build it with colcon: compose interface build {name} --generate FOLDER"
                 raise CommandError(str(error), hint=hint) from error
             files = package.files(None)
         _replace_folder(target, files)
-    except package_files.InvalidPackage as error:
+    except scaffolding.InvalidPackage as error:
         raise CommandError(str(error)) from error
     except (OSError, UnicodeDecodeError) as error:
         raise CommandError(f"cannot complete package '{name}': {error}") from error

@@ -190,7 +190,7 @@ def _write_changes(folder: Path, changes: FolderChanges) -> None:
 
 def update_typings(project: Project) -> None:
     """Bring the stubs of a project up to date, if it has some; say so, or what prevents it."""
-    from composer.base.ownership import TrustedUsers
+    from composer.base.folders import TrustedUsers
     from composer.base.source import shown_path
     from composer.python_code.stubs.folder import TYPINGS, folder_changes, has_stubs
 

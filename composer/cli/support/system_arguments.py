@@ -118,7 +118,7 @@ def _own_system(name: str, path: Path, example: Path | None) -> Path:
 
     Raises UsageError if it belongs to another user, whose file must be named explicitly.
     """
-    from composer.base.ownership import TrustedUsers
+    from composer.base.folders import TrustedUsers
     from composer.base.source import shown_path
 
     shown = shown_path(path)
@@ -134,7 +134,7 @@ def _own_system(name: str, path: Path, example: Path | None) -> Path:
 
 def example_systems() -> dict[str, Path]:
     """Return the bundled example systems, by name."""
-    from composer.base.resources import systems_folder
+    from composer.base.folders import systems_folder
 
     return {path.stem: path for path in sorted(systems_folder().glob("*.yaml"))}
 

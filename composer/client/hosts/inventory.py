@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import open_regular, read_regular
+from composer.base.files import open_regular, read_regular
 from composer.interfaces.sources import installed_prefixes
 
 _MAX_DESCRIPTION_BYTES = 4_000_000

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import open_regular, read_regular, write_whole
+from composer.base.files import open_regular, read_regular, write_whole
 from composer.model.names import is_selected
 
 MAX_FILE_BYTES = 10 * 1024 * 1024

@@ -17,7 +17,7 @@ from pathlib import Path
 import yaml
 
 from composer.base.diagnostics import Diagnostic, nearest, shown
-from composer.base.regular_files import FileTooLargeError, NotRegularError, read_regular
+from composer.base.files import FileTooLargeError, NotRegularError, read_regular
 from composer.base.source import SourceFile, Span, shown_path
 from composer.language.document.builder import TreeBuilder, parse_events
 from composer.language.document.limits import MAX_BYTES, Stopped

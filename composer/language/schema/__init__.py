@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any
 
 from composer.base.diagnostics import Diagnostic
-from composer.base.resources import schemas_folder
+from composer.base.folders import schemas_folder
 from composer.language.schema.explanations import explain_errors
 from composer.language.schema.validation import schema_errors
 from composer.language.tree import Mapping, plain

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.kept_result import KeptResult
+from composer.base.files import KeptResult
 from composer.python_code.problems import CheckerFailed
 from composer.python_code.stubs.folder import LIBRARIES
 

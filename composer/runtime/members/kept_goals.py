@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
-from composer.base.regular_files import write_whole
+from composer.base.files import write_whole
 from composer.model import PrimaryState, System
 from composer.runtime.protocol.codec import decode, encode
 

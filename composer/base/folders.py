@@ -1,21 +1,68 @@
-"""Which users' folders a search through parent folders may use.
+"""Folders: those of the package, those of ROS, and which users a search may trust.
 
-A search reaches folders that other users can write to, such as /tmp. What it finds decides which
-Python a system runs, so the owner is checked, as git does (``safe.directory``).
+Data files are JSON Schemas, node types, systems, interfaces and pages of rules. A wheel has them in
+``composer/share/`` (see pyproject.toml). In a checkout or an editable install, they are next to the
+package.
+
+A search through parent folders reaches folders that other users can write to, such as /tmp. What it
+finds decides which Python a system runs, so the owner is checked, as git does
+(``safe.directory``).
 """
 
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
 
+PACKAGE = Path(__file__).resolve().parents[1]
 #: Folders that are used regardless of their owner, separated by colons; ``*`` stands for all.
 SAFE_FOLDERS_VARIABLE = "COMPOSE_SAFE_FOLDERS"
 _ALL = "*"
 _ROOT = 0
 _GONE = -1
+
+
+def data_folder() -> Path:
+    """Return the folder that the other ones are in."""
+    share = PACKAGE / "share"
+    # The wheel first: `nodes` next to an installed package would belong to another distribution.
+    return share if share.is_dir() else PACKAGE.parent
+
+
+def schemas_folder() -> Path:
+    """Return the folder of the JSON Schemas."""
+    return data_folder() / "schemas"
+
+
+def nodes_folder() -> Path:
+    """Return the folder of the node types that come with the composer."""
+    return data_folder() / "nodes"
+
+
+def systems_folder() -> Path:
+    """Return the folder of the example systems."""
+    return data_folder() / "systems"
+
+
+def interfaces_folder() -> Path:
+    """Return the source of the ament package composer_interfaces (.srv and .action files)."""
+    return data_folder() / "interfaces"
+
+
+def rules_folder() -> Path:
+    """Return the folder of the pages about rules, ``docs/rules`` in a checkout."""
+    in_wheel = data_folder() / "rules"
+    return in_wheel if in_wheel.is_dir() else data_folder() / "docs/rules"
+
+
+def ament_prefixes(environment: Mapping[str, str] = os.environ) -> list[Path]:
+    """Return the prefixes that ROS searches: ``AMENT_PREFIX_PATH``, then this Python's."""
+    listed = environment.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return [Path(prefix) for prefix in dict.fromkeys((*filter(None, listed), sys.prefix))]
 
 
 @dataclass(frozen=True, slots=True)
