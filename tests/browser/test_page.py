@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.graph.diagram import Graph
 from composer.graph.output import Format, render
 from composer.graph.views import View, build_graph, scene_of

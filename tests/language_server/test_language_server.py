@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.resources import nodes_folder, schemas_folder, systems_folder
+from composer.base.folders import nodes_folder, schemas_folder, systems_folder
 from composer.language.document import read_document
 from composer.language.tree import Entry, Mapping, Sequence, Tree
 from tests.language_server.client import Cursor, LanguageServer

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.graph.diagram import Graph
 from composer.graph.formats import mermaid
 from composer.graph.views import View, build_graph, scene_of

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.base.source import SourceFile
 from composer.language.document import parse_document
 from composer.language.document.writer import write_document

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 from jsonschema.validators import extend
 
-from composer.base.resources import nodes_folder, systems_folder
+from composer.base.folders import nodes_folder, systems_folder
 from composer.language.document import read_document
 from composer.language.schema import SCHEMAS, schema
 from composer.language.schema.validation import schema_errors

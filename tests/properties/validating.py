@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from composer.base.diagnostics import Diagnostic
-from composer.base.resources import interfaces_folder, nodes_folder, systems_folder
+from composer.base.folders import interfaces_folder, nodes_folder, systems_folder
 from composer.base.source import Span
 from composer.interfaces import Interfaces
 from composer.language.document import read_document

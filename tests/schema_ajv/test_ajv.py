@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 
-from composer.base.resources import nodes_folder, systems_folder
+from composer.base.folders import nodes_folder, systems_folder
 from composer.base.source import SourceFile
 from composer.language.document import parse_document, read_document
 from composer.language.schema import REPORT, SCHEMAS, check_schema, kind_of, schema

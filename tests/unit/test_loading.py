@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Severity
-from composer.base.resources import nodes_folder, systems_folder
+from composer.base.folders import nodes_folder, systems_folder
 from composer.interfaces import Interfaces
 from composer.loading import load
 from composer.loading.reported import LoadResult

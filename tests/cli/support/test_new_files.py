@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.bridges.scaffolding import interface_package
+from composer.bridges import scaffolding
 from composer.cli.commands.interface import complete_package
 from composer.cli.support.errors import CommandError
 from composer.cli.support.new_files import write_files
@@ -109,7 +109,7 @@ def test_an_interface_package_stays_if_it_cannot_be_replaced(
         def files(self, _: object) -> dict[str, str]:
             return {"a": "a", "a/b": "b"}  # no folder and file of one name
 
-    monkeypatch.setattr(interface_package, "bundled_package", lambda _: Package())
+    monkeypatch.setattr(scaffolding, "bundled_package", lambda _: Package())
     with pytest.raises(CommandError, match="cannot complete package 'tf2_msgs'"):
         complete_package("tf2_msgs", None, target, for_pip=False)
     assert contents(tmp_path) == before

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.language.document import read_document
 from composer.language.tree import plain
 from composer.loading import load_bytes

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from composer.base.resources import interfaces_folder
+from composer.base.folders import interfaces_folder
 from composer.dashboard.forms import Forms
 from composer.dashboard.protocol.messages import RequestError
 from composer.interfaces import Interfaces

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.base.resources import interfaces_folder, nodes_folder
+from composer.base.folders import interfaces_folder, nodes_folder
 from composer.project import Project
 from composer.project.node_types import (
     NodeTypes,

@@ -12,7 +12,7 @@ import pytest
 from jsonschema import Draft7Validator
 
 from composer.base.diagnostics import Diagnostic, Label, Severity
-from composer.base.resources import schemas_folder
+from composer.base.folders import schemas_folder
 from composer.base.source import SourceFile, Span
 from composer.loading import load_files
 from composer.report.machine import fingerprints, render_github, render_json, render_sarif

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from composer.base.diagnostics import Severity
-from composer.bridges.importing.found import FoundSystem
+from composer.bridges.importing import FoundSystem
 from composer.bridges.importing.launch_file import describe_launch_file
 from composer.bridges.importing.writing import write_system
 from composer.launch.variants import all_visits, mark

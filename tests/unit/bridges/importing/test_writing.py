@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.bridges.importing.found import FoundNode, FoundParameter, FoundPort, FoundSystem
+from composer.bridges.importing import FoundNode, FoundParameter, FoundPort, FoundSystem
 from composer.bridges.importing.live import describe_graph
 from composer.bridges.importing.writing import readable, write_node_type, write_system
 from composer.interfaces import Interfaces

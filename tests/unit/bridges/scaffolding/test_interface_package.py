@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.bridges.scaffolding.interface_package import (
+from composer.bridges.scaffolding import (
     InvalidPackage,
     bundled_package,
     read_package,

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft7Validator
 
-from composer.base.resources import nodes_folder, schemas_folder, systems_folder
+from composer.base.folders import nodes_folder, schemas_folder, systems_folder
 from composer.language.document import read_document
 from composer.language.schema import SCHEMAS, check_schema, kind_of, schema
 from composer.language.schema.explanations import KEYWORDS
