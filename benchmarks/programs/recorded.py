@@ -25,7 +25,7 @@ from benchmarks.programs.behaviors import DurationSource
 from composer.bags.system_recording import SystemRecording
 from composer.loading import load
 from composer.model.qos import QosProfile
-from composer.model.recording import Recording
+from composer.model.system import Recording
 from composer.plan import bring_up, tear_down
 from composer.runtime.clock import COMPUTER
 from composer.runtime.host import Host

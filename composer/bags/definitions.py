@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from composer.interfaces import Action, Field, FieldType, Interfaces, Message, Service, parts
-from composer.interfaces.listing import definition_text
+from composer.interfaces.index import definition_text
 
 _SEPARATOR = "=" * 80
 _GOAL_ID = Field("goal_id", FieldType("unique_identifier_msgs/msg/UUID"))

@@ -3,6 +3,9 @@
 A folder can hold pipes, devices and files without an end. Only regular files are opened, also
 through symbolic links, and at most a given size is read. So reading never waits, and never takes
 more memory than that.
+
+Results are kept by the content of all that they depend on, in a folder that belongs to the user
+alone. Whatever goes wrong with it, the result is computed again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""New files from templates: projects, systems, node types, interface packages."""
+"""New files from templates: projects, systems, node types, interface packages.
+
+An interface package is completed so that pip and colcon can build it. Its source has the
+definitions and a ``package.xml`` with at least a name. Dependencies come from the types of the
+fields.
+"""
 
 from __future__ import annotations
 

@@ -42,6 +42,7 @@ _OTHER_MODULES = {
     "down": "system_commands",
     "import": "import_nodes",
     "node": "nodes",
+    "log-level": "nodes",
     "test": "scenarios",
     "service": "calls",
     "action": "calls",

@@ -21,8 +21,8 @@ from composer.dashboard.recordings import RECORDINGS
 from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:
+    from composer.client.lifecycle import NodeOutcome
     from composer.client.session import Deadline
-    from composer.client.systems.lifecycle_batch import NodeOutcome
     from composer.dashboard.observing.ros_graph import RosGraph
 
 _READ_S = 5.0
@@ -120,7 +120,7 @@ def transition(values: Values, _: Dashboard) -> Prepared:
     dependents = values.flag("dependents")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
+        from composer.client.lifecycle import LifecycleBatch, LifecycleRequest
 
         batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
         outcomes = batch.run(dependents=dependents)
@@ -134,7 +134,7 @@ def restart(values: Values, _: Dashboard) -> Prepared:
     name = values.text("node")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
+        from composer.client.lifecycle import LifecycleBatch, LifecycleRequest
 
         message = _restart_by_manager(ros, deadline, name)
         if message is not None:

@@ -11,12 +11,16 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.protocol.messages import BadRequestError, RequestError
+from composer.dashboard.declared import Declared
+from composer.dashboard.feeds import Feed
+from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, to_json
+from composer.dashboard.protocol.outbox import Update
 from composer.rules.replays import Recorded, read_metadata
 
 FOLDER = Path("bags")
@@ -192,3 +196,18 @@ def _end(processes: list[subprocess.Popen[bytes]]) -> None:
 
 #: Those of this process, which is one dashboard.
 RECORDINGS = Recordings(FOLDER)
+
+
+class BagsFeed(Feed):
+    """The bags, every second."""
+
+    def __init__(self, values: Values, _: Declared | None) -> None:
+        del values
+        self._last = ""
+
+    def poll(self) -> Iterator[Update]:
+        """Yield the list if something has changed."""
+        text = to_json(RECORDINGS.state())
+        if text != self._last:
+            self._last = text
+            yield Update(text)

@@ -26,7 +26,7 @@ from composer.language.document import parse_bytes
 from composer.language.expand import missing_names
 from composer.language.expand.arguments import read_declarations
 from composer.language.rules import MISSING_VARIABLE
-from composer.language.schema import kind_of, kinds
+from composer.language.schema import SYSTEM, kind_of
 from composer.language.tree import Entry
 from composer.language.tree_values import word
 from composer.loading.merging import Definitions, Document, read, real_folder
@@ -163,9 +163,9 @@ def load_bytes(
 def _missing_arguments(document: Document, given: Map[str, Entry]) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each argument of a system without a value."""
     tree = document.tree
-    if tree is None or kind_of(tree) != kinds.SYSTEM:
+    if tree is None or kind_of(tree) != SYSTEM:
         return
-    declared = read_declarations(tree, kinds.SYSTEM) or {}
+    declared = read_declarations(tree, SYSTEM) or {}
     for name in missing_names(tree, given):
         choices = " or ".join(f"{name}={word(item)}" for item in declared[name].alternatives)
         yield Diagnostic(

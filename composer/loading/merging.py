@@ -12,12 +12,17 @@ from composer.base.diagnostics import Diagnostic, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
+from composer.language import schema
 from composer.language.document import read_document
 from composer.language.document.limits import MAX_ENTRIES, MAX_NODES
 from composer.language.expand import expand
 from composer.language.rules import TOO_LARGE
-from composer.language.schema import check_schema, kind_of, kinds
-from composer.language.schema.kinds import check_kind, with_intended_sections
+from composer.language.schema import (
+    check_kind,
+    check_schema,
+    kind_of,
+    with_intended_sections,
+)
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree
 from composer.language.tree import Sequence as ListTree
 from composer.language.tree_values import entries
@@ -116,15 +121,15 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
     if not tree:
         return Merged()
     match kind_of(tree):
-        case kinds.SYSTEM | kinds.NODE if (surplus := _surplus_entry(tree)) is not None:
+        case schema.SYSTEM | schema.NODE if (surplus := _surplus_entry(tree)) is not None:
             return Merged(diagnostics=[surplus])
-        case kinds.SYSTEM:
+        case schema.SYSTEM:
             return _merged(
                 assemble(tree, document.source, definitions.folder, definitions.project, arguments)
             )
-        case kinds.NODE:
+        case schema.NODE:
             return _merge_node_type(tree, document.source, definitions, arguments)
-        case kinds.SCENARIO:
+        case schema.SCENARIO:
             return _merge_scenario(tree, document.source, definitions)
         case _:
             problem = check_kind(tree, document.source)
@@ -150,15 +155,15 @@ def _merged(assembly: AssembledSystem) -> Merged:
 
 def _merge_scenario(tree: Mapping, source: SourceFile, definitions: Definitions) -> Merged:
     """Return the system of a scenario, with its arguments and overrides, as if it included it."""
-    tree, diagnostics = with_intended_sections(tree, kinds.SCENARIO)
+    tree, diagnostics = with_intended_sections(tree, schema.SCENARIO)
     arguments = tuple(entry for entry in tree if entry.name == "arguments")
     others = tuple(entry for entry in tree if entry.name != "arguments")
     expanded, found, *_ = expand(Mapping(others, tree.span), {})  # a scenario declares no names
     tree = Mapping((*expanded, *arguments), tree.span)
-    diagnostics += [*found, *check_schema(tree, kinds.SCENARIO)]
+    diagnostics += [*found, *check_schema(tree, schema.SCENARIO)]
     project, folder = definitions.project, definitions.folder
     keys = [entry for entry in tree if entry.name in ("arguments", "overrides")]
-    file = tree.entry(kinds.SYSTEM)
+    file = tree.entry(schema.SYSTEM)
     if file is None:
         return Merged(diagnostics=diagnostics)
     named = Entry(Scalar("file", file.key.span), _system_path(file.value, folder, project))
@@ -203,5 +208,5 @@ def _merge_node_type(
     if inherited.tree is None:
         return Merged(diagnostics=inherited.diagnostics)
     expanded, found, *_ = expand(inherited.tree, arguments)
-    diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, kinds.NODE)]
+    diagnostics = [*inherited.diagnostics, *found, *check_schema(expanded, schema.NODE)]
     return Merged(inherited.tree, expanded, diagnostics, inherited.folders)

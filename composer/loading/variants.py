@@ -1,4 +1,9 @@
-"""The models of a file: one for each combination of its arguments, before the rules."""
+"""The models of a file: one for each combination of its arguments, before the rules.
+
+``compose validate`` checks each combination: both values of a bool, each of the ``choices``, and
+the default of any other argument. The first combination has the defaults. Their diagnostics are
+joined here as well.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +18,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.expand.arguments import Declared, read_declarations
 from composer.language.rules import TOO_LARGE, UNUSED_DECLARATION
-from composer.language.schema import kind_of, kinds
-from composer.language.schema.kinds import SYSTEM
+from composer.language.schema import SYSTEM, kind_of
 from composer.language.tree import Entry, Scalar, Tree, plain
 from composer.language.tree import Mapping as MapTree
 from composer.language.tree import Sequence as ListTree
@@ -267,7 +271,7 @@ def resolve_file(
     given = overrides or Overrides()
     diagnostics = [*document.diagnostics, *override_diagnostics]
     tree = document.tree
-    if tree is None or not all_combinations or kind_of(tree) != kinds.SYSTEM:
+    if tree is None or not all_combinations or kind_of(tree) != SYSTEM:
         variant = _merged(document, definitions, given.arguments, diagnostics)
         _add_model(variant, document.source, definitions, given)
         return Resolved(document.source, definitions, [variant])

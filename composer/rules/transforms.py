@@ -17,7 +17,7 @@ from composer.model import (
     StaticTransform,
     Transforms,
 )
-from composer.model.geometry import is_unit, normalized
+from composer.model.transforms import is_unit, normalized
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.expressions import message_templates
 from composer.rules.analysis.formatting import number

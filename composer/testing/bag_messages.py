@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from composer.bags.bag import NANOSECONDS, Bag, BagError, BagMessage
-from composer.bags.operations import Selection, decoded
+from composer.bags.comparing import decoded
+from composer.bags.editing import Selection
 from composer.model import ChannelKind, System, channels
 
 

@@ -12,8 +12,9 @@ from typing import Any
 from rclpy.serialization import serialize_message
 
 from composer.bags.bag import NANOSECONDS, Bag, BagError, BagMessage, BagTopic
+from composer.bags.comparing import Difference, Tolerances, decoded, differences
 from composer.bags.definitions import full_definition
-from composer.bags.operations import Difference, Selection, Tolerances, decoded, differences
+from composer.bags.editing import Selection
 from composer.bags.system_recording import FACTS, STARTED
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 from composer.model import TF_STATIC_TOPIC, Transforms
-from composer.model.geometry import Quaternion, Transform, Vector
+from composer.model.transforms import Quaternion, Transform, Vector
 from composer.runtime.node.transforms import NodeTransforms
 from composer.runtime.transforms.buffer import TransformBuffer
 from composer.runtime.transforms.listener import TransformListeners, nanoseconds, transform_of

@@ -24,7 +24,7 @@ from typing import Any, Unpack
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from composer.bags.operations import Selection
+from composer.bags.editing import Selection
 from composer.bags.reader import open_bag
 from composer.model import ParameterType, PortKind
 from composer.model.names import matches_wildcard

@@ -9,10 +9,10 @@ from typing import Any
 
 from composer.base.characters import escape_lines
 from composer.bridges.importing import FoundNode, FoundParameter, FoundSystem
+from composer.bridges.importing.conditions import condition
 from composer.language.document.scalars import NumberRefused, resolve_plain
 from composer.language.expressions import ExpressionError, compile_expression
 from composer.language.tree import Plain
-from composer.launch.conditions import condition
 from composer.launch.variants import (
     identifier,
     inner_sections,

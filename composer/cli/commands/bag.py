@@ -34,7 +34,7 @@ from composer.cli.support.terminal import as_json, lines, write
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
-    from composer.bags.operations import Selection
+    from composer.bags.editing import Selection
 
 bag_app = command_group("Inspect, cut, join and compare bags of ROS 2.")
 
@@ -131,7 +131,7 @@ def diff(
     """
     require_ros("compose bag diff")
     with bag_errors():
-        from composer.bags.operations import differences
+        from composer.bags.comparing import differences
 
         ours, theirs = opened(expected), opened(actual)
         chosen = selection(topics, 0.0, None)
@@ -163,7 +163,7 @@ def _write(
     split: tuple[float | None, float | None],
 ) -> None:
     with bag_errors():
-        from composer.bags.operations import write_bag
+        from composer.bags.editing import write_bag
         from composer.bags.writer import split_limits
 
         bags: list[Bag] = [opened(path) for path in paths]

@@ -84,7 +84,7 @@ def show(
     Nested messages are expanded and indented, without their comments.
     """
     from composer.interfaces import parts
-    from composer.interfaces.listing import listing
+    from composer.interfaces.index import listing
 
     interfaces = _interfaces()
     definition = _find(interfaces, name)

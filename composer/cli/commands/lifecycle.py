@@ -18,7 +18,7 @@ from composer.cli.support.terminal import as_json, lines, say, write, write_list
 from composer.model.lifecycle import TRANSITIONS
 
 if TYPE_CHECKING:
-    from composer.client.systems.lifecycle_batch import LifecycleBatch
+    from composer.client.lifecycle import LifecycleBatch
 
 lifecycle_app = command_group(
     """Show and change lifecycle states of running nodes.
@@ -163,8 +163,8 @@ def set_state(
     """
     targets, transition = _split(list(words or ()), to)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
+        from composer.client.lifecycle import LifecycleBatch, LifecycleRequest
         from composer.client.session import RosError
-        from composer.client.systems.lifecycle_batch import LifecycleBatch, LifecycleRequest
 
         request = LifecycleRequest(transition, None if to is None else to.value)
         batch = LifecycleBatch(session, deadline, targets, request)

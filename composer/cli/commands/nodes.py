@@ -1,4 +1,4 @@
-"""``compose node``, and what ``list`` and ``info`` of all names in the ROS graph share."""
+"""``compose node``, ``compose log-level``, and what ``list`` and ``info`` of all names share."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from composer.cli.support.options import (
 )
 from composer.cli.support.ros import graph_names, require_ros, ros_session
 from composer.cli.support.terminal import as_json, columns, lines, write, write_list
+from composer.model import LogLevel
 
 NodeName = Annotated[
     str,
@@ -44,6 +45,12 @@ _NODE_SECTIONS = (
     ("Service Clients", "clients"),
     ("Action Servers", "action_servers"),
     ("Action Clients", "action_clients"),
+)
+node_app = command_group("List and inspect running nodes.")
+EPILOG = examples(
+    "compose log-level                 the levels of all nodes",
+    "compose log-level planner         the level of a node",
+    "compose log-level planner debug   set it",
 )
 
 
@@ -83,9 +90,6 @@ def described(kind: str, name: str, timeout: float) -> dict[str, Any]:
         return GraphNames(session, deadline).details(kind, name)
 
 
-node_app = command_group("List and inspect running nodes.")
-
-
 @node_app.command("list", epilog=examples("compose node list", "compose node list --json"))
 def list_nodes(
     *, hidden: Hidden = False, json: Json = False, timeout: Timeout = DEFAULT_TIMEOUT_S
@@ -118,3 +122,35 @@ def node_info(
         rows = [(f"    {item}:", ", ".join(types)) for item, types in node[key]]
         shown += columns(rows).split("\n") if rows else []
     write(lines(shown))
+
+
+def log_level(
+    node: AnyNode = None,
+    level: Annotated[
+        LogLevel | None,
+        typer.Argument(
+            metavar="[LEVEL]", help="debug, info, warn, error or fatal. Default: print it."
+        ),
+    ] = None,
+    *,
+    json: Json = False,
+    timeout: Timeout = DEFAULT_TIMEOUT_S,
+) -> None:
+    """Print or set the log levels of running nodes.
+
+    It works in every lifecycle state. The level stays until the process of the node ends, also if
+    the node is restarted. Programs need the logger services of rclpy or rclcpp.
+    """
+    with ros_session("compose log-level", timeout) as (session, deadline):
+        from composer.client.logger_levels import LoggerLevels
+
+        levels = LoggerLevels(session, deadline)
+        found: dict[str, str | None]
+        if node is None:
+            found = levels.all()
+        elif level is None:
+            found = dict([levels.get(node)])
+        else:
+            found = {levels.set(node, level): level.value}
+    rows = [(name, text or "(no response)") for name, text in found.items()]
+    write_list("node", rows, found, json=json)

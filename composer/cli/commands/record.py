@@ -138,7 +138,7 @@ def _chosen(
     session: Session, deadline: Deadline, system: str | None, patterns: Mapping[str, list[str]]
 ) -> Callable[[TopicInfo], bool]:
     """Return which topics to record. Raises RosError if there is no such system."""
-    from composer.model.recording import is_chosen
+    from composer.model.system import is_chosen
 
     if system is None:
         return lambda info: is_chosen(info.name, patterns)

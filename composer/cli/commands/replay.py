@@ -32,8 +32,9 @@ from composer.cli.support.terminal import Keys, lines, say, write
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
+    from composer.bags.comparing import Tolerances
+    from composer.bags.editing import Selection
     from composer.bags.graph_replay import ReplayOptions
-    from composer.bags.operations import Selection, Tolerances
     from composer.testing.bag_replay import Replay
 
 EPILOG = examples(

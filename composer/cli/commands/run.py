@@ -329,7 +329,7 @@ def _require(system: System, *, dashboard: bool) -> None:
 
 def _recording(system: System, *, all_of_it: bool, clock: Clock) -> SystemRecording | None:
     """Return the recording that the system or ``--record`` requests. Raises CommandError."""
-    from composer.model.recording import Recording
+    from composer.model.system import Recording
 
     settings = system.recording
     if all_of_it:

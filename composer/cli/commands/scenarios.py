@@ -161,7 +161,7 @@ def _check_exploration(real_time: bool, repeat: int, bag_on_failure: bool) -> No
 
 def _loaded(paths: Sequence[Path]) -> list[LoadResult]:
     """Return the scenarios in files and folders. Raises UsageError."""
-    from composer.language.schema import kind_of, kinds
+    from composer.language.schema import SCENARIO, kind_of
     from composer.loading import load_files
     from composer.loading.merging import read
     from composer.project.files import find_files
@@ -171,7 +171,7 @@ def _loaded(paths: Sequence[Path]) -> list[LoadResult]:
     scenarios = []
     for path in find_files(paths).files:
         tree = read(path).tree
-        if tree is not None and kind_of(tree) == kinds.SCENARIO:
+        if tree is not None and kind_of(tree) == SCENARIO:
             scenarios.append(path)
         elif path in paths:
             hint = "a scenario begins with 'scenario: <name>'"

@@ -91,7 +91,7 @@ Filter = Annotated[
 
 def _path(path: str | None) -> str | None:
     """Check ``--field`` before ROS starts."""
-    from composer.client.messages.values import path_steps
+    from composer.client.messages.field_paths import path_steps
 
     if path is not None:
         try:

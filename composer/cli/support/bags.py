@@ -20,7 +20,8 @@ from composer.cli.support.terminal import say
 
 if TYPE_CHECKING:
     from composer.bags.bag import Bag
-    from composer.bags.operations import Selection, Tolerances
+    from composer.bags.comparing import Tolerances
+    from composer.bags.editing import Selection
 
 BagPath = Annotated[
     Path, typer.Argument(metavar="BAG", help="The folder of a bag, or a .mcap or .db3 file.")
@@ -128,7 +129,7 @@ def matches(topic: str, patterns: list[str] | None) -> bool:
 
 def selection(topics: list[str] | None, start_s: float, duration_s: float | None) -> Selection:
     """Return the part of a bag that the options select."""
-    from composer.bags.operations import Selection
+    from composer.bags.editing import Selection
 
     until_s = inf if duration_s is None else duration_s
     return Selection(lambda name: matches(name, topics), start_s, until_s)
@@ -136,7 +137,7 @@ def selection(topics: list[str] | None, start_s: float, duration_s: float | None
 
 def tolerances(value: float, time_s: float | None, ignored: list[str] | None) -> Tolerances:
     """Return what counts as equal."""
-    from composer.bags.operations import Tolerances
+    from composer.bags.comparing import Tolerances
 
     return Tolerances(value, inf if time_s is None else time_s, tuple(ignored or ()))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from array import array
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 from composer.base.characters import counted
 from composer.base.diagnostics import suggestion
 from composer.base.source import SourceFile
+from composer.client.messages.field_paths import path_steps
 from composer.client.session import RosError
 from composer.interfaces import Interfaces
 from composer.interfaces.index import similar_interface
@@ -25,12 +25,6 @@ from composer.runtime.ros.messages import (
     to_plain,
 )
 
-_SLASHES = 2
-_TYPE_HINT = "a type has three parts, such as std_msgs/msg/String"
-#: Builds a message; its expressions see the names of the scope.
-Build = Callable[[Mapping[str, Any]], Any]
-_STEP = re.compile(r"(?P<name>\w+)(?P<indices>(?:\[\d+\])*)", re.ASCII)
-
 
 class _Kind(NamedTuple):
     """The folder of an interface kind, and an attribute that only its classes have."""
@@ -44,6 +38,11 @@ _KINDS = {
     "service": _Kind("srv", "Request"),
     "action": _Kind("action", "Goal"),
 }
+_SLASHES = 2
+_TYPE_HINT = "a type has three parts, such as std_msgs/msg/String"
+
+#: Builds a message; its expressions see the names of the scope.
+Build = Callable[[Mapping[str, Any]], Any]
 
 
 class InvalidValueError(RosError):
@@ -164,21 +163,3 @@ def _step(value: Any, step: str | int, path: str) -> Any:
             items = counted(len(value), "item")
             raise InvalidValueError(f"'{path}': index {step} of {items}") from error
     raise InvalidValueError(f"'{path}': {value!r:.60} has no part '{step}'")
-
-
-def path_steps(path: str) -> list[str | int]:
-    """Return the field names and indices of a path; ``ranges.3`` is the same as ``ranges[3]``.
-
-    Raises ValueError if it is not a path.
-    """
-    steps: list[str | int] = []
-    for part in path.split("."):
-        match = _STEP.fullmatch(part)
-        if match is None:
-            raise ValueError(
-                f"'{path}' is not a path of fields and indices, such as transforms[0].header.stamp"
-            )
-        name = match["name"]
-        steps.append(int(name) if name.isdigit() else name)
-        steps += map(int, re.findall(r"\d+", match["indices"]))
-    return steps

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from composer.dashboard.channels.bags import BagsFeed
 from composer.dashboard.channels.graph import LiveFeed, PictureFeed
 from composer.dashboard.channels.messages import EchoFeed, ImageFeed, LogFeed, PlotFeed
 from composer.dashboard.channels.nodes import NodesFeed, ParametersFeed, TimingFeed
@@ -17,6 +16,7 @@ from composer.dashboard.channels.topics import ServicesFeed, TopicsFeed
 from composer.dashboard.declared import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import Values
+from composer.dashboard.recordings import BagsFeed
 
 CHANNELS: dict[str, Callable[[Values, Declared | None], Feed]] = {
     "graph": PictureFeed,

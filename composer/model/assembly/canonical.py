@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TypeVar
 
-from composer.language.schema import schema
-from composer.language.schema.kinds import NODE, SYSTEM
+from composer.language.schema import NODE, SYSTEM, schema
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
 
 T = TypeVar("T")

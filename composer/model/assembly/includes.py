@@ -13,14 +13,19 @@ from composer.base.source import Span
 from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand import expand, missing_names
 from composer.language.rules import CYCLE, EMPTY_COLLECTION, MISSING_VARIABLE
-from composer.language.schema import check_schema
-from composer.language.schema.kinds import SYSTEM, with_intended_sections
+from composer.language.schema import SYSTEM, check_schema, with_intended_sections
 from composer.language.tree import Entry, LeftOut, Mapping, Tree, count_values, plain
 from composer.language.tree_values import entries, items, plain_text
-from composer.model.assembly.include_entries import Include, IncludeReader, SystemFile, read_include
+from composer.model.assembly.include_entries import (
+    PREFIXED,
+    Include,
+    IncludeReader,
+    SystemFile,
+    add_namespace,
+    read_include,
+)
 from composer.model.assembly.limits import SystemLimits, exceeded
 from composer.model.assembly.merging import INCLUDE, Part, apply_overrides, join_parts
-from composer.model.assembly.namespacing import PREFIXED, add_namespace
 from composer.model.assembly.references import (
     WILDCARD,
     expand_references,

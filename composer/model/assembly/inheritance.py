@@ -12,7 +12,7 @@ from composer.base.source import Located, SourceFile
 from composer.language.document import read_document
 from composer.language.document.limits import MAX_INCLUDE_DEPTH, Stopped
 from composer.language.rules import CYCLE
-from composer.language.schema.kinds import NODE, check_kind, with_intended_sections
+from composer.language.schema import NODE, check_kind, with_intended_sections
 from composer.language.tree import Mapping, count_values
 from composer.language.tree_values import text
 from composer.model.assembly.limits import UNKNOWN_BASE, SystemLimits, exceeded

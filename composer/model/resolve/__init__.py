@@ -13,9 +13,9 @@ from types import MappingProxyType
 
 from composer.base.diagnostics import Diagnostic, in_order
 from composer.base.source import SourceFile
+from composer.language import schema
 from composer.language.document.limits import TooManyErrors
-from composer.language.schema import kind_of, kinds
-from composer.language.schema.kinds import check_kind
+from composer.language.schema import check_kind, kind_of
 from composer.language.tree import Mapping
 from composer.model import System
 from composer.model.resolve.overrides import (
@@ -49,9 +49,9 @@ def resolve(
     extra = overrides if overrides is not None else Overrides()
     try:
         match kind_of(tree):
-            case kinds.SYSTEM:
+            case schema.SYSTEM:
                 system, diagnostics = resolve_system(tree, source, source_folders, extra)
-            case kinds.NODE:
+            case schema.NODE:
                 system, diagnostics = resolve_node_type(tree, source, source_folders, extra)
             case _:
                 wrong = check_kind(tree, source)

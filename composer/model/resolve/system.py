@@ -44,7 +44,6 @@ from composer.model import (
 from composer.model.assembly.limits import SystemLimits
 from composer.model.hosts import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
 from composer.model.names import join
-from composer.model.recording import Recording
 from composer.model.resolve.connections import read_chains, read_connections
 from composer.model.resolve.node import (
     SystemContext,
@@ -61,6 +60,7 @@ from composer.model.resolve.parameters import (
     without_sections_of_others,
 )
 from composer.model.resolve.qos import qos_table
+from composer.model.system import Recording
 from composer.project.node_types import SourceFolders
 
 

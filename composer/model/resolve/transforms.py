@@ -23,7 +23,7 @@ from composer.model import (
     Transforms,
     transform_ports,
 )
-from composer.model.geometry import IDENTITY, Quaternion, Transform, Vector, quaternion_of_angles
+from composer.model.transforms import IDENTITY, Quaternion, Transform, Vector, quaternion_of_angles
 
 _ANGLES = ("roll", "pitch", "yaw")
 _ROTATIONS = ("rotation_rad", "rotation_deg", "quaternion")

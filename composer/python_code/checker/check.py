@@ -64,10 +64,10 @@ class Check:
     ) -> Iterator[tuple[str, Problem]]:
         """Yield the problems of each file: one of a family in a line, and one of each message."""
         # Most code has no findings, and these modules take 10 ms of each start.
-        from composer.python_code.checker.code_index import CodeIndex  # noqa: PLC0415 - slow
         from composer.python_code.checker.findings import Reader  # noqa: PLC0415 - slow
-        from composer.python_code.checker.owners import Owners  # noqa: PLC0415 - slow
+        from composer.python_code.checker.imports import Owners  # noqa: PLC0415 - slow
         from composer.python_code.checker.relevance import (  # noqa: PLC0415 - slow
+            CodeIndex,
             Relevance,
             changed_names,
         )

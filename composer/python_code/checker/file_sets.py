@@ -21,9 +21,9 @@ from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.stubs.behaviors import (
     behavior_class_name,
     behavior_module,
+    message_stubs,
 )
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
-from composer.python_code.stubs.messages import message_stubs
 from composer.python_code.syntax import Module
 from composer.typed import SUFFIX
 

@@ -14,8 +14,7 @@ from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Interfaces
-from composer.python_code.checker.imports import Imports
-from composer.python_code.checker.owners import Owner
+from composer.python_code.checker.imports import Imports, Owner
 from composer.python_code.checker.pyrefly import MISSING_RETURN, Finding
 from composer.python_code.checker.relevance import (
     ARGUMENT,

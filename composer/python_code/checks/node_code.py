@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from composer.base.diagnostics import nearest
 from composer.interfaces import Interfaces
 from composer.model import Node
-from composer.python_code.checker.callbacks import TRANSITIONS
-from composer.python_code.checks.messages import message_problems
-from composer.python_code.checks.scopes import Code, NodeScope
+from composer.python_code.checker.copies import TRANSITIONS
+from composer.python_code.checks.messages import Code, NodeScope, message_problems
 from composer.python_code.lookup import BehaviorSource, imported_from, is_of_rclpy
 from composer.python_code.nodes import (
     calls_on_self,

@@ -15,8 +15,7 @@ from composer import behavior
 from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Interfaces
 from composer.model import Node
-from composer.python_code.stubs.behaviors import behavior_module
-from composer.python_code.stubs.messages import message_stubs
+from composer.python_code.stubs.behaviors import behavior_module, message_stubs
 
 #: The name that pyright and Pylance look for.
 TYPINGS = "typings"

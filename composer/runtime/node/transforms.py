@@ -20,7 +20,7 @@ from composer.model import (
     StaticTransform,
     Transforms,
 )
-from composer.model.geometry import IDENTITY
+from composer.model.transforms import IDENTITY
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.reactions import MessageReaction
 from composer.runtime.executors.futures import Future

@@ -16,7 +16,7 @@ from composer.behavior import (
     TransformExtrapolationError,
     TransformLookupError,
 )
-from composer.model.geometry import IDENTITY, Transform, compose, interpolate, inverse, is_unit
+from composer.model.transforms import IDENTITY, Transform, compose, interpolate, inverse, is_unit
 
 #: As in tf2.
 HISTORY_NS = 10_000_000_000
