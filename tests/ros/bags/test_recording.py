@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from std_msgs.msg import String
 
 from composer.bags.bag import Bag, BagError, BagMessage, BagTopic
-from composer.bags.operations import decoded
+from composer.bags.comparing import decoded
 from composer.bags.reader import open_bag
 from composer.bags.recorder import Recorder
 from composer.runtime.clock import COMPUTER

@@ -16,7 +16,7 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from composer.bags.bag import BagError
-from composer.bags.operations import Selection, write_bag
+from composer.bags.editing import Selection, write_bag
 from composer.bags.reader import open_bag
 from composer.bags.writer import BagWriter, SplitLimits
 from tests.unit.bags.test_form import read, write

@@ -30,7 +30,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from composer.bags import qos_yaml
 from composer.bags.bag import Attachment, Bag, BagError, BagMessage, BagTopic
 from composer.bags.definitions import full_definition
-from composer.bags.operations import Selection, write_bag
+from composer.bags.editing import Selection, write_bag
 from composer.bags.reader import open_bag
 from composer.bags.writer import BagWriter, SplitLimits
 from composer.cli.support.bags import bag_errors

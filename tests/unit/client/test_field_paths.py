@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.client.messages.values import path_steps
+from composer.client.messages.field_paths import path_steps
 
 
 @pytest.mark.parametrize(

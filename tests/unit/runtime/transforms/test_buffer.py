@@ -14,7 +14,7 @@ from composer.behavior import (
     TransformExtrapolationError,
     TransformLookupError,
 )
-from composer.model.geometry import (
+from composer.model.transforms import (
     IDENTITY,
     Quaternion,
     Transform,
