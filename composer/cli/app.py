@@ -39,7 +39,7 @@ COMMANDS = {
 }
 _ALL = tuple(name for names in COMMANDS.values() for name in names)
 _OTHER_MODULES = {
-    "down": "system_commands",
+    "down": "lifecycle",
     "import": "import_nodes",
     "node": "nodes",
     "log-level": "nodes",

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from composer.dashboard.channels.nodes import COMMANDS
 from composer.dashboard.channels.sending import read_outgoing
 from composer.dashboard.channels.topics import shown_qos
-from composer.dashboard.context import Dashboard, Operation, Prepared
-from composer.dashboard.declared import required
+from composer.dashboard.context import Dashboard, Operation, Prepared, required
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe
 from composer.dashboard.recordings import RECORDINGS
 from composer.model.lifecycle import TRANSITIONS

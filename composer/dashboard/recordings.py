@@ -17,7 +17,7 @@ from tempfile import TemporaryFile
 from typing import IO, Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, to_json
 from composer.dashboard.protocol.outbox import Update

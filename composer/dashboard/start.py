@@ -8,8 +8,7 @@ from pathlib import Path
 
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.access import Access, is_loopback, new_token, read_token
-from composer.dashboard.context import Dashboard, Options
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Dashboard, Declared, Options
 from composer.dashboard.feeds import Feeds
 from composer.dashboard.forms import Forms
 from composer.dashboard.recordings import RECORDINGS

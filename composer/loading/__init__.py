@@ -27,18 +27,23 @@ from composer.language.expand import missing_names
 from composer.language.expand.arguments import read_declarations
 from composer.language.rules import MISSING_VARIABLE
 from composer.language.schema import SYSTEM, kind_of
-from composer.language.tree import Entry
-from composer.language.tree_values import word
+from composer.language.tree import Entry, word
 from composer.loading.merging import Definitions, Document, read, real_folder
-from composer.loading.reported import Identity, LoadResult, identity, may_be_included
+from composer.loading.reported import (
+    Identity,
+    LoadResult,
+    add_include_labels,
+    deduplicate,
+    identity,
+    may_be_included,
+)
 from composer.loading.variants import Checked, Resolved, joined_diagnostics, resolve_file
-from composer.model.assembly.deduplication import add_include_labels, deduplicate
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, read_overrides
 from composer.project.settings import apply_rule_settings, check_rule_settings
 from composer.rules import all_checks, reported, run_checks
 from composer.rules.analysis.subjects import joined, without_consequences
 from composer.rules.ignore_comments import UNUSED_IGNORE, without_ignored
-from composer.rules.type_check import TypeCheck
+from composer.rules.python import TypeCheck
 
 
 @contextmanager

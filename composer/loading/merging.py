@@ -23,9 +23,8 @@ from composer.language.schema import (
     kind_of,
     with_intended_sections,
 )
-from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree
+from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree, entries
 from composer.language.tree import Sequence as ListTree
-from composer.language.tree_values import entries
 from composer.model.assembly import (
     AssembledSystem,
     NodeTypeFile,

@@ -19,10 +19,9 @@ from composer.base.source import SourceFile, Span
 from composer.language.expand.arguments import Declared, read_declarations
 from composer.language.rules import TOO_LARGE, UNUSED_DECLARATION
 from composer.language.schema import SYSTEM, kind_of
-from composer.language.tree import Entry, Scalar, Tree, plain
+from composer.language.tree import Entry, Scalar, Tree, plain, word
 from composer.language.tree import Mapping as MapTree
 from composer.language.tree import Sequence as ListTree
-from composer.language.tree_values import word
 from composer.loading.merging import Definitions, Document, Merged, merge
 from composer.loading.reported import Identity, identity
 from composer.model import System

@@ -23,8 +23,7 @@ from composer.base.source import Located, SourceFile, Span, shown_path
 from composer.language.document import read_document
 from composer.language.rules import UNREADABLE_FILE, YAML_SYNTAX
 from composer.language.schema import check_schema
-from composer.language.tree import Mapping, Sequence
-from composer.language.tree_values import entries, flag, key, plain_text, texts
+from composer.language.tree import Mapping, Sequence, entries, flag, key, plain_text, texts
 
 BAD_SETTING = error("RC042", "bad-setting")
 FOREIGN_OWNER = warning("RC044", "foreign-owner")

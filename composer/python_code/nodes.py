@@ -12,7 +12,7 @@ from typing import TypeAlias
 from composer import behavior
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
-from composer.language.tree_values import is_opaque
+from composer.language.tree import is_opaque
 from composer.model import Node, Port, PortKind, System
 from composer.model.resolve.parameters import rclpy_type
 from composer.project import Project

@@ -9,7 +9,7 @@ from pathlib import Path, PurePath
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
 from composer.base.source import Located, Span, shown_path
 from composer.language.rules import UNUSED_DECLARATION
-from composer.language.tree_values import is_opaque
+from composer.language.tree import is_opaque
 from composer.model import ImplementationKind, Isolation, Node, Port, PortKind, System
 from composer.project import SETTINGS_FILE, Project
 from composer.project.node_types import replaced_built_in_type

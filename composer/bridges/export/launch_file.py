@@ -9,8 +9,7 @@ from pathlib import Path
 
 from composer.bridges.templates import filled
 from composer.language.expand.arguments import Declared
-from composer.language.tree import Scalar, plain
-from composer.language.tree_values import word
+from composer.language.tree import Scalar, plain, word
 from composer.model import System
 
 #: The arguments of every such launch file. They hide arguments of the system with the same names.

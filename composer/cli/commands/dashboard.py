@@ -30,7 +30,7 @@ from composer.cli.support.system_arguments import (
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
-    from composer.dashboard.declared import Declared
+    from composer.dashboard.context import Declared
 
 EPILOG = examples(
     "compose dashboard                            the whole ROS graph",
@@ -147,7 +147,7 @@ def _declared(
     text: str, arguments: list[str] | None, options: LoadOptions, autostart: Autostart | None
 ) -> Declared | None:
     """Return the system of a file; None for the name of a running system without a known file."""
-    from composer.dashboard.declared import Declared
+    from composer.dashboard.context import Declared
     from composer.model import PrimaryState
 
     is_file = path_exists(Path(text)) or text.endswith((".yaml", ".yml"))

@@ -19,7 +19,8 @@ from composer.cli.support.system_arguments import running_system_name
 from composer.cli.support.terminal import columns, say, use_color, write, write_raw
 
 if TYPE_CHECKING:
-    from composer.client.run_log import Record, Run, Selection, SystemLog
+    from composer.client.run_log import Run
+    from composer.client.run_log.reading import Record, Selection, SystemLog
 
 EPILOG = examples(
     "compose logs                                  the latest run in this domain",
@@ -98,7 +99,7 @@ def logs(
         write(_listed(runs, json=json))
         return
     chosen = _chosen(runs, run)
-    from composer.client.run_log import SystemLog
+    from composer.client.run_log.reading import SystemLog
 
     folder = _folder()
     if not json:
@@ -119,7 +120,7 @@ def logs(
 
 
 def _selection(nodes: list[str], since: str | None, level: LogSeverity) -> Selection:
-    from composer.client.run_log import Selection, parse_since
+    from composer.client.run_log.reading import Selection, parse_since
 
     since_ns = 0 if since is None else parse_since(since, datetime.now().astimezone())
     if since_ns is None:

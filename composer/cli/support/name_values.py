@@ -76,7 +76,7 @@ def _completed_arguments(
     systems: Iterable[str], words: Sequence[str], incomplete: str
 ) -> list[str]:
     """Return the arguments that continue a word. Bash makes three words of NAME=VALUE."""
-    from composer.language.tree_values import word as value
+    from composer.language.tree import word as value
 
     name = next((word for word in reversed(words) if word != "="), None)
     completed = []
@@ -119,8 +119,7 @@ def print_arguments(text: str) -> None:
     """
     from composer.base.diagnostics import has_errors
     from composer.language.document import read_document
-    from composer.language.tree import plain
-    from composer.language.tree_values import word
+    from composer.language.tree import plain, word
     from composer.report.text import render
 
     path = system_file(text)

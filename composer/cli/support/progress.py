@@ -14,7 +14,8 @@ from composer.cli.support.console import OutputQueue
 from composer.cli.support.line_format import Line, LineFormat
 from composer.cli.support.process import report_ready, take_ready_descriptor
 from composer.cli.support.terminal import columns, lines, say, use_color
-from composer.client.run_log import Record, RotatingFile, RunFolder
+from composer.client.run_log import RotatingFile, RunFolder
+from composer.client.run_log.reading import Record
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.middleware.environment import log_folder
 from composer.runtime.supervision.events import (

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 from composer.base.characters import escape_line
 from composer.base.fast_dataclass import dataclass
 from composer.base.files import NotRegularError, open_regular
-from composer.client.run_log.runs import Run, find_parts, find_runs, log_files
+from composer.client.run_log import Run, find_parts, find_runs, log_files
 from composer.model.names import PROGRAM_LOGGER, is_selected
 
 _MICROSECOND_NS = 1000

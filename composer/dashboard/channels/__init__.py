@@ -13,7 +13,7 @@ from composer.dashboard.channels.messages import EchoFeed, ImageFeed, LogFeed, P
 from composer.dashboard.channels.nodes import NodesFeed, ParametersFeed, TimingFeed
 from composer.dashboard.channels.sending import GoalFeed, PublishingFeed
 from composer.dashboard.channels.topics import ServicesFeed, TopicsFeed
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import Values
 from composer.dashboard.recordings import BagsFeed

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.declared import Declared, required
+from composer.dashboard.context import Declared, required
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update

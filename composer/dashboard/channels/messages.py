@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.observing.log_lines import SEVERITIES_BY_NAME
 from composer.dashboard.observing.topics import TopicReader

@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe, to_json
 from composer.dashboard.protocol.outbox import Update

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe, to_json
 from composer.dashboard.protocol.outbox import Delivery, Update

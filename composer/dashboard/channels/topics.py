@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.channels.messages import COMPRESSED, IMAGE
-from composer.dashboard.declared import Declared
+from composer.dashboard.context import Declared
 from composer.dashboard.feeds import Feed
 from composer.dashboard.protocol.messages import Values, to_json
 from composer.dashboard.protocol.outbox import Update

@@ -14,7 +14,8 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from composer.base.fast_dataclass import dataclass
-from composer.client.run_log import current_domain, find_parts, find_runs, last_records
+from composer.client.run_log import current_domain, find_parts, find_runs
+from composer.client.run_log.reading import last_records
 from composer.model import SEVERITIES
 from composer.model.names import PROGRAM_LOGGER
 from composer.model.qos import Durability, QosProfile, Reliability

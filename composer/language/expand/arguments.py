@@ -16,8 +16,16 @@ from collections.abc import Iterator
 from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.language import rules
-from composer.language.tree import Mapping, Scalar, Sequence, Tree, describe, plain
-from composer.language.tree_values import is_opaque, items
+from composer.language.tree import (
+    Mapping,
+    Scalar,
+    Sequence,
+    Tree,
+    describe,
+    is_opaque,
+    items,
+    plain,
+)
 
 #: The section that declares the names of a file, by the kind of the file.
 SECTIONS = {"system": "arguments", "node": "variables"}

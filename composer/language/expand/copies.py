@@ -23,8 +23,17 @@ from composer.language.document.limits import MAX_COPIES
 from composer.language.expand.arguments import Declared, as_bool
 from composer.language.expand.substitution import Substitution, has_reference, pieces, references
 from composer.language.expressions import EvaluationError, ExpressionError, compile_expression
-from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree, describe, plain
-from composer.language.tree_values import word
+from composer.language.tree import (
+    Entry,
+    LeftOut,
+    Mapping,
+    Scalar,
+    Sequence,
+    Tree,
+    describe,
+    plain,
+    word,
+)
 
 CONDITIONS = ("if", "unless")
 _WHOLE = re.compile(r"\$\{([^{}]*)\}")

@@ -20,8 +20,7 @@ from composer.language.schema.hints import (
     value_advice,
 )
 from composer.language.schema.validation import Path, SchemaError
-from composer.language.tree import Entry, Mapping, Scalar, Tree, describe
-from composer.language.tree_values import entries, items
+from composer.language.tree import Entry, Mapping, Scalar, Tree, describe, entries, items
 
 #: Keys that determine which other keys are valid, and the titles of schemas that have them.
 _DECIDING = frozenset({"type", "topic", "service", "action"})

@@ -16,8 +16,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language.document.limits import LimitedDiagnostics, Stopped, TooManyErrors
 from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
-from composer.language.tree import Entry, LeftOut, Mapping
-from composer.language.tree_values import entries, is_opaque
+from composer.language.tree import Entry, LeftOut, Mapping, entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver
 from composer.model.assembly.inheritance import Inherited, NodeTypeFile, inherit, read_node_type

@@ -17,8 +17,17 @@ from composer.base.source import Located, SourceFile, Span
 from composer.language.document import read_document, similar_file
 from composer.language.rules import TOO_LARGE, UNREADABLE_FILE
 from composer.language.schema import SYSTEM, check_kind
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree
-from composer.language.tree_values import changed_at, entries, is_opaque, text
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Scalar,
+    Sequence,
+    Tree,
+    changed_at,
+    entries,
+    is_opaque,
+    text,
+)
 from composer.model import USE_SIM_TIME
 from composer.model.assembly.limits import INVALID_INCLUDE, SystemLimits
 from composer.model.assembly.merging import merge_maps

@@ -14,8 +14,17 @@ from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand import expand, missing_names
 from composer.language.rules import CYCLE, EMPTY_COLLECTION, MISSING_VARIABLE
 from composer.language.schema import SYSTEM, check_schema, with_intended_sections
-from composer.language.tree import Entry, LeftOut, Mapping, Tree, count_values, plain
-from composer.language.tree_values import entries, items, plain_text
+from composer.language.tree import (
+    Entry,
+    LeftOut,
+    Mapping,
+    Tree,
+    count_values,
+    entries,
+    items,
+    plain,
+    plain_text,
+)
 from composer.model.assembly.include_entries import (
     PREFIXED,
     Include,

@@ -13,8 +13,7 @@ from composer.language.document import read_document
 from composer.language.document.limits import MAX_INCLUDE_DEPTH, Stopped
 from composer.language.rules import CYCLE
 from composer.language.schema import NODE, check_kind, with_intended_sections
-from composer.language.tree import Mapping, count_values
-from composer.language.tree_values import text
+from composer.language.tree import Mapping, count_values, text
 from composer.model.assembly.limits import UNKNOWN_BASE, SystemLimits, exceeded
 from composer.model.assembly.merging import merge_maps
 from composer.project import Project

@@ -16,9 +16,11 @@ from composer.language.tree import (
     ScalarValue,
     Sequence,
     Tree,
+    changed_at,
+    entries,
+    is_opaque,
     plain,
 )
-from composer.language.tree_values import changed_at, entries, is_opaque
 from composer.model.assembly.limits import INVALID_INCLUDE, UNKNOWN_OVERRIDE
 
 PARAMETERS = "parameters"

@@ -9,8 +9,20 @@ from typing import TypeAlias
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Sequence, Tree, plain
-from composer.language.tree_values import changed_at, entries, items, mapping, plain_text
+from composer.language.tree import (
+    Entry,
+    LeftOut,
+    Mapping,
+    Scalar,
+    Sequence,
+    Tree,
+    changed_at,
+    entries,
+    items,
+    mapping,
+    plain,
+    plain_text,
+)
 from composer.model.assembly.limits import SystemLimits
 from composer.model.names import matches_wildcard
 

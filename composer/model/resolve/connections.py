@@ -7,8 +7,11 @@ from typing import TypeVar
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.language.tree import Entry, Mapping, Sequence, Tree
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Sequence,
+    Tree,
     choice,
     entries,
     is_opaque,

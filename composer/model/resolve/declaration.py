@@ -7,14 +7,20 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Plain,
+    Scalar,
+    Sequence,
+    Tree,
     choice,
     entries,
     environment,
     flag,
     key,
     number,
+    plain,
     plain_text,
     text,
     texts,

@@ -10,8 +10,11 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Sequence, Tree
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Sequence,
+    Tree,
     choice,
     entries,
     flag,

@@ -6,8 +6,10 @@ from dataclasses import fields
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Tree
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Tree,
     choice,
     entries,
     flag,

@@ -17,8 +17,7 @@ from composer.base.source import Located, Span
 from composer.language.expand import expand, missing_names
 from composer.language.rules import MISSING_VARIABLE
 from composer.language.schema import NODE, check_schema
-from composer.language.tree import Entry, Mapping, Plain, Tree, plain
-from composer.language.tree_values import entries
+from composer.language.tree import Entry, Mapping, Plain, Tree, entries, plain
 from composer.model.assembly import Inherited, inherit, read_node_type
 from composer.model.resolve.declaration import Declaration, declare
 from composer.model.resolve.qos import QosTable

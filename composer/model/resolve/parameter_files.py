@@ -24,8 +24,16 @@ from composer.base.diagnostics import (
 )
 from composer.base.source import Located, SourceFile, Span, shown_path
 from composer.language.document import read_parameter_document
-from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, describe
-from composer.language.tree_values import is_opaque, texts
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Scalar,
+    Sequence,
+    Tree,
+    describe,
+    is_opaque,
+    texts,
+)
 from composer.model.names import node_name_problem
 from composer.model.resolve.parameter_sections import ParameterFiles, Section
 from composer.project import OUTSIDE_HINT, Project

@@ -7,14 +7,20 @@ from collections.abc import Mapping as Map
 
 from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree, plain
-from composer.language.tree_values import (
+from composer.language.tree import (
     OPAQUE,
+    Entry,
+    Mapping,
+    Plain,
+    Scalar,
+    Sequence,
+    Tree,
     entries,
     flag,
     is_opaque,
     key,
     number,
+    plain,
     plain_text,
     text_or_opaque,
 )

@@ -11,8 +11,11 @@ from composer.base.diagnostics import Diagnostic, error
 from composer.base.source import Located, Span
 from composer.language.expressions import Expression, ExpressionError, compile_expression
 from composer.language.templates import Computed, Template, Text, compile_template
-from composer.language.tree import Entry, Mapping, Scalar, Tree
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Scalar,
+    Tree,
     choice,
     entries,
     flag,

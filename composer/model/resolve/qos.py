@@ -10,8 +10,19 @@ from typing import Any
 
 from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located, Span
-from composer.language.tree import Entry, Mapping, Scalar, Tree
-from composer.language.tree_values import choice, entries, integer, is_opaque, key, number, text
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Scalar,
+    Tree,
+    choice,
+    entries,
+    integer,
+    is_opaque,
+    key,
+    number,
+    text,
+)
 from composer.model import ChannelKind, NamedQos, Qos, QosReference
 from composer.model.qos import DURATIONS, PRESETS, WORDS, QosProfile
 

@@ -8,8 +8,11 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
-from composer.language.tree import Entry, Mapping, Scalar, Tree, plain
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Scalar,
+    Tree,
     choice,
     entries,
     flag,
@@ -17,6 +20,7 @@ from composer.language.tree_values import (
     items,
     key,
     number,
+    plain,
     plain_text,
     text,
     text_or_opaque,

@@ -10,8 +10,10 @@ from functools import cache, partial
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
 from composer.language.document.limits import LimitedDiagnostics
-from composer.language.tree import Entry, Mapping, Scalar
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Scalar,
     choice,
     entries,
     environment,

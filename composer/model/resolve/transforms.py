@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterator
 
 from composer.base.source import Located
-from composer.language.tree import Entry, Mapping, Sequence, Tree
-from composer.language.tree_values import (
+from composer.language.tree import (
+    Entry,
+    Mapping,
+    Sequence,
+    Tree,
     entries,
     flag,
     key,
