@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.client.run_log import Record, RotatingFile, RunFolder
+from composer.client.run_log import RotatingFile, RunFolder
+from composer.client.run_log.reading import Record
 from tests.cli.compose import compose
 
 

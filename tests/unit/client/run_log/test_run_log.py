@@ -14,17 +14,15 @@ import pytest
 
 from composer.cli.support.console import OutputQueue
 from composer.client.run_log import (
-    Record,
+    FOLDER,
+    MAX_RUNS,
     RotatingFile,
     Run,
     RunFolder,
-    Selection,
-    SystemLog,
     find_runs,
-    parse_since,
+    log_files,
 )
-from composer.client.run_log.reading import parse_line
-from composer.client.run_log.runs import FOLDER, MAX_RUNS, log_files
+from composer.client.run_log.reading import Record, Selection, SystemLog, parse_line, parse_since
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 
@@ -212,7 +210,8 @@ def test_the_log_of_a_system_has_the_lines_of_its_processes_once(tmp_path: Path)
 WRITER = """
 import sys
 from pathlib import Path
-from composer.client.run_log import Record, RotatingFile, RunFolder
+from composer.client.run_log import RotatingFile, RunFolder
+from composer.client.run_log.reading import Record
 folder = RunFolder(Path(sys.argv[1]), "/pipeline")
 file = RotatingFile(folder.path, max_bytes=1000, max_files=100)
 for number in range(100):
