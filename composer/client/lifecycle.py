@@ -18,15 +18,13 @@ from rclpy.type_support import check_is_valid_srv_type
 from composer.base.fast_dataclass import dataclass
 from composer.client.graph_names import check_all_respond, find_node, not_found_error
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.client.systems.managers import Systems
+from composer.client.systems.managers import REPORT_WITHIN_S, Systems
 from composer.client.systems.node_services import NodeServices
 from composer.model.lifecycle import PRIMARY_STATES, TRANSITIONS, next_transition
 from composer.model.names import is_pattern, is_selected
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 
-#: Managers publish their last report to each new subscription, and again every second.
-_REPORT_WITHIN_S = 2.0
 _RANK = {"finalized": -1, "unconfigured": 0, "inactive": 1, "active": 2}
 
 
@@ -292,7 +290,7 @@ def _outcome(change: Callable[[], CompletedTransition]) -> NodeOutcome:
 def _system_reports(session: Session, deadline: Deadline) -> dict[str, SystemReport | None]:
     """Return the reports of the known systems, None for those that do not respond."""
     systems = Systems(session, deadline)
-    limit = Deadline(min(_REPORT_WITHIN_S, deadline.left_s))
+    limit = Deadline(min(REPORT_WITHIN_S, deadline.left_s))
     return systems.reports({*systems.discover(), *local_systems()}, limit)
 
 

@@ -105,14 +105,7 @@ class Session:
         try:
             # Without signal handlers: Ctrl-C remains Python's KeyboardInterrupt.
             self._context.init(list(ROS_ARGUMENTS))
-            self.node = _SessionNode(
-                f"{COMMAND_PREFIX}{os.getpid()}",
-                context=self._context,
-                use_global_arguments=False,
-                enable_rosout=False,
-                start_parameter_services=False,
-                parameter_overrides=[Parameter("start_type_description_service", value=False)],
-            )
+            self.node = _SessionNode(f"{COMMAND_PREFIX}{os.getpid()}", **self._node_options())
         except rclpy_implementation.RCLError as error:
             self._context.try_shutdown()
             refusal = start_refused(error)
@@ -131,6 +124,16 @@ class Session:
         self._executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
         self._context.try_shutdown()
+
+    def _node_options(self) -> dict[str, Any]:
+        """Return the arguments of a node of this session, which has no services."""
+        return {
+            "context": self._context,
+            "use_global_arguments": False,
+            "enable_rosout": False,
+            "start_parameter_services": False,
+            "parameter_overrides": [Parameter("start_type_description_service", value=False)],
+        }
 
     def is_local_discovered(self) -> bool:
         """Return whether all nodes of this computer are discovered."""

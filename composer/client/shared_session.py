@@ -9,7 +9,6 @@ from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 
 from composer.base.fast_dataclass import dataclass
@@ -42,14 +41,7 @@ class SharedSession(Session):
         self.changes = GraphChanges(self.node)
         self._handled = threading.Condition()
         self._is_open = True
-        self._samples = Node(
-            f"{self.node.get_name()}_samples",
-            context=self._context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-            parameter_overrides=[Parameter("start_type_description_service", value=False)],
-        )
+        self._samples = Node(f"{self.node.get_name()}_samples", **self._node_options())
         self._thread = threading.Thread(target=self._spin, name="ros session", daemon=True)
         self._thread.start()
 

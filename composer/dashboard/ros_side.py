@@ -151,7 +151,7 @@ class RosSide:
         _import()
         from composer.client.shared_session import SharedSession
         from composer.dashboard.observing.ros_graph import RosGraph
-        from composer.dashboard.observing.topology import first_topology
+        from composer.dashboard.observing.topics import first_topology
         from composer.runtime.middleware.dds_xml import announce_less_often
         from composer.runtime.middleware.environment import prepare_environment
 
@@ -185,7 +185,7 @@ def _return_memory() -> None:
 
 def _prepare() -> None:
     _import()
-    from composer.dashboard.observing.topology import first_topology
+    from composer.dashboard.observing.topics import first_topology
 
     first_topology()
 

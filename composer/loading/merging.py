@@ -14,9 +14,8 @@ from composer.base.source import SourceFile, Span
 from composer.interfaces import Interfaces
 from composer.language import schema
 from composer.language.document import read_document
-from composer.language.document.limits import MAX_ENTRIES, MAX_NODES
 from composer.language.expand import expand
-from composer.language.rules import TOO_LARGE
+from composer.language.rules import MAX_ENTRIES, MAX_NODES, TOO_LARGE
 from composer.language.schema import (
     check_kind,
     check_schema,

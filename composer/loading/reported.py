@@ -19,7 +19,7 @@ from composer.base.fast_dataclass import dataclass, replace
 from composer.base.files import read_regular
 from composer.base.source import Located, SourceFile, Span
 from composer.interfaces import Interfaces
-from composer.language.document.limits import MAX_BYTES
+from composer.language.rules import MAX_BYTES
 from composer.language.tree import Mapping
 from composer.model import Node, System
 from composer.model.scenario import Scenario

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import field
 from pathlib import Path
@@ -56,7 +55,7 @@ def find_files(paths: Iterable[Path]) -> FoundFiles:
     """
     search = _Search()
     for path in paths:
-        if _is_folder(path):
+        if os.path.isdir(path):  # noqa: PTH112 - false also for a path that is not valid
             search.search_folder(path)
         else:
             search.files[path] = None
@@ -72,8 +71,10 @@ class _Search:
     def search_folder(self, folder: Path) -> None:
         project = Project.at(folder)
         for path in sorted(self._yaml_files(folder)):
-            if path.name == SETTINGS_FILE or not _is_regular(path):
+            if path.name == SETTINGS_FILE:
                 continue  # settings are not checked as a file of their own
+            if not os.path.isfile(path):  # noqa: PTH113 - false also without the permission
+                continue
             if path.is_symlink() and not project.holds(path):
                 self.diagnostics.append(_link_out_of_project(path))
             else:
@@ -142,18 +143,3 @@ def _is_composer_file(path: Path) -> bool:
 
 def _has_content(line: str) -> bool:
     return bool(line.strip()) and not line.startswith(("#", "%", "---"))
-
-
-def _is_regular(path: Path) -> bool:
-    """Return whether ``path`` is a regular file, which can be opened without blocking."""
-    try:
-        return stat.S_ISREG(path.stat().st_mode)
-    except OSError:
-        return False
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):  # too long or not a valid path: reported when it is read
-        return False

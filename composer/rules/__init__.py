@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Severity, in_order
-from composer.language.document.limits import LimitedDiagnostics, TooManyErrors
+from composer.language.rules import LimitedDiagnostics, TooManyErrors
 from composer.rules.analysis.context import Check, Context, location
 from composer.rules.analysis.formatting import with_short_values
 

@@ -20,7 +20,7 @@ from composer.base.diagnostics import (
 )
 from composer.base.source import Span
 from composer.base.spelling import vocabulary
-from composer.language.document.limits import MAX_ERRORS
+from composer.language.rules import MAX_ERRORS
 from composer.model import ChannelKind, PortKind, PortOfNode, channels
 from composer.model.names import join, matches_wildcard
 from composer.rules.analysis.context import Context, is_unresolved, limited

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.base.source import Located, Span
-from composer.language.document.limits import MAX_ERRORS
+from composer.language.rules import MAX_ERRORS
 from composer.model import (
     Component,
     Executable,

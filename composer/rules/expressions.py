@@ -9,7 +9,7 @@ from composer.base.characters import counted
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
 from composer.base.source import Span
 from composer.interfaces import Interfaces, Message
-from composer.interfaces.field_types.constants import constant_problem, enumerator_problem
+from composer.interfaces.field_types.types import constant_problem, enumerator_problem
 from composer.language.expressions import FieldPath
 from composer.language.templates import Constant, Items, Record, Template
 from composer.model import Node

@@ -17,7 +17,7 @@ from composer.base.diagnostics import (
     warning,
 )
 from composer.base.spelling import misspelled
-from composer.language.document.limits import MAX_ERRORS
+from composer.language.rules import MAX_ERRORS
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
 from composer.model.names import expand_name, remapped_name, topic_name_problem
 from composer.rules.analysis.context import Context, is_unresolved

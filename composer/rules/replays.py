@@ -15,8 +15,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.files import read_regular
 from composer.base.source import Located
 from composer.language.document import parse_bytes
-from composer.language.document.limits import MAX_BYTES
-from composer.language.rules import OUT_OF_RANGE, UNREADABLE_FILE
+from composer.language.rules import MAX_BYTES, OUT_OF_RANGE, UNREADABLE_FILE
 from composer.language.tree import plain
 from composer.model import Channel, ChannelKind, PortOfNode, channels
 from composer.model.names import matches_wildcard

@@ -11,8 +11,8 @@ from dataclasses import fields, replace
 from composer.base.characters import escape_lines, is_safe
 from composer.base.source import SourceFile, Span
 from composer.bridges.importing import FoundNode, FoundParameter, FoundPort, FoundSystem
-from composer.language.document.limits import MAX_NODES
 from composer.language.document.writer import write_document
+from composer.language.rules import MAX_NODES
 from composer.language.tree import Entry, Mapping, Plain, Scalar, Sequence, Tree
 from composer.launch.variants import with_references
 from composer.model import ChannelKind, PortKind

@@ -34,10 +34,9 @@ def config(
     Exit code 1 if the system has errors; then nothing is printed.
     """
     from composer.cli.support.system_arguments import system_file
-    from composer.language.document.writer import write_document
+    from composer.language.document.writer import canonical, write_document
     from composer.language.tree import plain
     from composer.loading import gives_same_model
-    from composer.model.assembly.canonical import canonical
 
     path = system_file(system)
     result = load_system(path, system, arguments)

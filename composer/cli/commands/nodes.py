@@ -142,7 +142,7 @@ def log_level(
     the node is restarted. Programs need the logger services of rclpy or rclcpp.
     """
     with ros_session("compose log-level", timeout) as (session, deadline):
-        from composer.client.logger_levels import LoggerLevels
+        from composer.client.parameters import LoggerLevels
 
         levels = LoggerLevels(session, deadline)
         found: dict[str, str | None]

@@ -146,7 +146,7 @@ class _Checked:
 
 
 def _check(paths: Sequence[Path], stdin_name: str, arguments: Sequence[str]) -> _Checked:
-    from composer.language.document.limits import MAX_BYTES
+    from composer.language.rules import MAX_BYTES
     from composer.loading import load_bytes, load_files
     from composer.loading.reported import collect_diagnostics
     from composer.model.resolve import OverrideOptions

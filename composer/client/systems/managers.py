@@ -48,6 +48,8 @@ _TRIGGER_TYPE = "std_srvs/srv/Trigger"
 _SERVICE = f"/{NAME}/{IS_ACTIVE}"
 #: Fast DDS discovers a participant at once or within 3 s; managers report every second.
 DISCOVERY_S = 3.5
+#: Managers publish their last report to each new subscription, and again every second.
+REPORT_WITHIN_S = 2.0
 #: Managers send a new report once the subscription has received the latched one, which may be old,
 #: and at the latest within a second.
 _FRESH_WITHIN_S = 1.5

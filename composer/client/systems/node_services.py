@@ -17,15 +17,13 @@ from lifecycle_msgs.srv import GetState
 from composer.client.requests import ServiceCaller, required, type_of
 from composer.client.session import Deadline, Session
 from composer.client.systems.local_queries import nodes_with
-from composer.client.systems.managers import Systems
+from composer.client.systems.managers import REPORT_WITHIN_S, Systems
 from composer.runtime.protocol.codec import ProtocolError
 from composer.runtime.protocol.requests import NAME, REQUEST, CallNodes, NodeCall
 from composer.runtime.ros.graph import is_valid_name
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
 from composer.runtime.ros.service_requests import RequestService, read_answer, request_message
 
-#: Managers publish their last report to each new subscription, and again every second.
-_REPORT_WITHIN_S = 2.0
 #: The services that nodes may leave to their manager, by the names in its report.
 _SERVICES = {
     "lifecycle": ("get_state", "get_available_transitions", "change_state"),
@@ -131,7 +129,7 @@ class NodeServices:
 
     def _wait_for_reports(self, deadline: Deadline) -> None:
         new = set(self._systems.discover()) - self._awaited  # wait for each manager only once
-        limit = Deadline(min(_REPORT_WITHIN_S, deadline.left_s))
+        limit = Deadline(min(REPORT_WITHIN_S, deadline.left_s))
 
         def have_reported() -> bool | None:
             reports = self._systems.current()

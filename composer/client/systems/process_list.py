@@ -10,7 +10,7 @@ from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.lifecycle import LifecycleClient
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.local_queries import with_callbacks_of_processes
-from composer.client.systems.managers import DISCOVERY_S, Systems, without_members
+from composer.client.systems.managers import DISCOVERY_S, REPORT_WITHIN_S, Systems, without_members
 from composer.model.names import is_pattern, is_selected
 from composer.plan.drift import ObservedProcess
 from composer.runtime.process.instance_lock import local_systems
@@ -91,10 +91,6 @@ def _process_of(report: SystemReport, process: str, known: Mapping[str, SystemRe
     return report.name if is_own else name
 
 
-#: Managers publish their last report to each new subscription, and again every second.
-_REPORT_WITHIN_S = 2.0
-
-
 def find_managed_nodes(
     session: Session, deadline: Deadline, systems: Systems, targets: Iterable[str]
 ) -> dict[str, tuple[str, ...]]:
@@ -108,7 +104,7 @@ def find_managed_nodes(
         *local_systems(),
     }
     names = without_members(names)  # the others move their nodes for one of these
-    reports = systems.reports(names, Deadline(min(_REPORT_WITHIN_S, deadline.left_s)))
+    reports = systems.reports(names, Deadline(min(REPORT_WITHIN_S, deadline.left_s)))
     system_of = {
         node.node: name for name, report in reports.items() if report for node in report.nodes
     }

@@ -15,7 +15,7 @@ from composer.runtime.metrics.figures import CountedRate
 
 if TYPE_CHECKING:
     from composer.dashboard.observing.diagrams import Diagram
-    from composer.dashboard.observing.topology import Topology
+    from composer.dashboard.observing.topics import Topology
     from composer.runtime.protocol.reports import NodeReport
 
 VIEWS = ("nodes", "connections", "lifecycle", "deployment", "states")

@@ -15,7 +15,7 @@ from composer.graph.facts import discovered_qos_facts
 from composer.model import PortKind
 
 if TYPE_CHECKING:
-    from composer.dashboard.observing.topology import Topology
+    from composer.dashboard.observing.topics import Topology
     from composer.plan.drift import ObservedEndpoint
 
 _MAX_MEASURED = 40

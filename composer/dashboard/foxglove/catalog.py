@@ -14,7 +14,7 @@ from composer.dashboard.protocol.outbox import Update
 from composer.model import PortKind
 
 if TYPE_CHECKING:
-    from composer.dashboard.observing.topology import Topology
+    from composer.dashboard.observing.topics import Topology
 
 _CLOCK, _CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
 _PERIOD_S = 0.2

@@ -15,8 +15,7 @@ from composer.client.systems.local_queries import local_report
 from composer.client.systems.managers import DISCOVERY_S, Systems
 from composer.dashboard.observing.diagrams import Diagrams
 from composer.dashboard.observing.log_lines import LogLines
-from composer.dashboard.observing.topics import TopicMeters, TopicReader
-from composer.dashboard.observing.topology import Topology
+from composer.dashboard.observing.topics import TopicMeters, TopicReader, Topology
 from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import SystemReport

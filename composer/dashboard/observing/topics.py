@@ -1,26 +1,33 @@
 """Reads topics as bytes: for channels that show messages, and to measure rates and sizes.
 
 Of large messages, and of topics with many bytes per second, only some messages are read.
+
+The topology has the nodes of the ROS graph with their endpoints, and what the views ask about them.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.base.fast_dataclass import dataclass
-from composer.dashboard.observing.topology import Topology
 from composer.dashboard.protocol.messages import RequestError
 from composer.model import PortKind
+from composer.model.names import is_hidden
 from composer.model.qos import Durability, QosProfile, Reliability, strictest_compatible
+from composer.plan.drift import ObservedEndpoint, ObservedNode, Snapshot, is_manager
 from composer.runtime.metrics.figures import MessageRate
 
 if TYPE_CHECKING:
     from composer.client.shared_session import Sample, SampledTopic, SharedSession
     from composer.plan.drift import ObservedEndpoint
 
+
+_GET_STATE = "lifecycle_msgs/srv/GetState"
 #: Messages of these types are expected to be large. Another type is large once a message was.
 LARGE_TYPES = frozenset(
     f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "PointCloud2", "PointCloud")
@@ -33,6 +40,83 @@ _BURST_S = 0.3
 _LARGE_DEPTH = 5
 #: Messages of a measured topic that may wait, and that are taken at once.
 _MEASURED_DEPTH, _MAX_MEASURED = 100, 200
+
+
+@dataclass(frozen=True)
+class Topology:
+    """The nodes of the ROS graph with all of their endpoints. ``revision`` counts changes.
+
+    ``counts`` has the number of nodes of each name. Nodes of commands are left out.
+    """
+
+    revision: int
+    nodes: Mapping[str, tuple[ObservedEndpoint, ...]]
+    counts: Mapping[str, int]
+
+    @cached_property
+    def visible(self) -> list[str]:
+        """The names of nodes that are not hidden, sorted."""
+        return [name for name in self.nodes if not is_hidden(name)]
+
+    @cached_property
+    def lifecycle_nodes(self) -> frozenset[str]:
+        """The nodes that report their lifecycle state on request."""
+        return frozenset(
+            node
+            for node, ends in self.nodes.items()
+            if any((end.name, end.type) == (f"{node}/get_state", _GET_STATE) for end in ends)
+        )
+
+    def snapshot(self, states: Mapping[str, str | None]) -> Snapshot:
+        """Return the nodes as :mod:`composer.graph` and :mod:`composer.plan.drift` read them."""
+        return Snapshot(
+            tuple(
+                ObservedNode(
+                    full_name=name,
+                    endpoints=tuple(end for end in ends if not end.is_for_tools),
+                    state=states.get(name, ""),
+                    count=self.counts.get(name, 1),
+                )
+                for name, ends in self.nodes.items()
+            )
+        )
+
+    @cached_property
+    def of_topics(self) -> Mapping[str, list[tuple[str, ObservedEndpoint]]]:
+        """The endpoints of each topic with the names of their nodes."""
+        found: dict[str, list[tuple[str, ObservedEndpoint]]] = {}
+        for name in self.visible:
+            for end in self.nodes[name]:
+                if end.kind in (PortKind.PUBLISHER, PortKind.SUBSCRIPTION):
+                    found.setdefault(end.name, []).append((name, end))
+        return found
+
+    @cached_property
+    def managers(self) -> frozenset[str]:
+        """The managers of running systems: the page shows their reports and has their commands."""
+        return frozenset(node for node, ends in self.nodes.items() if is_manager(node, ends))
+
+    def is_for_tools(self, name: str) -> bool:
+        """Return whether a topic or service is hidden by name, or is one of a manager."""
+        return is_hidden(name) or name.rpartition("/")[0] in self.managers
+
+
+def first_topology() -> Topology | None:
+    """Return what systems on this computer know of the ROS graph, None if none is certain.
+
+    Ask before joining it: systems are not certain while they discover another process.
+    """
+    from composer.client.systems.local_queries import local_endpoints
+    from composer.runtime.ros_graph.graph import COMMAND_PREFIX
+
+    answer = local_endpoints()
+    if answer is None:
+        return None
+    found, names = answer
+    counts = Counter(
+        name for name in names if not name.rpartition("/")[2].startswith(COMMAND_PREFIX)
+    )
+    return Topology(1, {name: found[name] for name in sorted(found) if name in counts}, counts)
 
 
 def large_profile(profile: QosProfile) -> QosProfile:

@@ -10,7 +10,6 @@ from composer.base.diagnostics import nearest, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import FieldType, Interfaces, Message
-from composer.interfaces.field_types.constants import constant_problem
 from composer.interfaces.field_types.inference import infer, literal_integer
 from composer.interfaces.field_types.types import (
     ANYTHING,
@@ -18,6 +17,7 @@ from composer.interfaces.field_types.types import (
     Problem,
     Scope,
     ValueType,
+    constant_problem,
     described,
     fields_of,
     is_array,

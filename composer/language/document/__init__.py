@@ -20,10 +20,16 @@ from composer.base.diagnostics import Diagnostic, nearest, shown
 from composer.base.files import FileTooLargeError, NotRegularError, read_regular
 from composer.base.source import SourceFile, Span, shown_path
 from composer.language.document.builder import TreeBuilder, parse_events
-from composer.language.document.limits import MAX_BYTES, Stopped
 from composer.language.document.parameter_files import ParameterFileBuilder
 from composer.language.document.scalars import check_text, resolve_plain
-from composer.language.rules import KEY_WITHOUT_VALUE, TOO_LARGE, UNREADABLE_FILE, YAML_SYNTAX
+from composer.language.rules import (
+    KEY_WITHOUT_VALUE,
+    MAX_BYTES,
+    TOO_LARGE,
+    UNREADABLE_FILE,
+    YAML_SYNTAX,
+    Stopped,
+)
 from composer.language.tree import Mapping, Scalar, ScalarValue, Tree, describe
 
 #: Larger files are systems, which are parsed once anyway.

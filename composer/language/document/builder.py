@@ -16,8 +16,8 @@ from composer.base.diagnostics import Diagnostic, Label, Rule, line_subject, sho
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
 from composer.language import rules
-from composer.language.document.limits import MAX_DEPTH, MAX_VALUES, LimitedDiagnostics, Stopped
 from composer.language.document.scalars import NumberRefused, check_value, resolve_plain
+from composer.language.rules import MAX_DEPTH, MAX_VALUES, LimitedDiagnostics, Stopped
 from composer.language.tree import Entry, Mapping, Scalar, ScalarValue, Sequence, Tree, describe
 
 _BLOCK_STYLES = ("|", ">")

@@ -16,8 +16,8 @@ from composer.base.diagnostics import Diagnostic, shown
 from composer.base.source import SourceFile
 from composer.language import rules
 from composer.language.document.builder import TreeBuilder, scalar_span, span_at
-from composer.language.document.limits import MAX_NUMBER_LENGTH, Stopped
 from composer.language.document.scalars import NumberRefused, check_value
+from composer.language.rules import MAX_NUMBER_LENGTH, Stopped
 from composer.language.tree import Mapping, Scalar, ScalarValue, Tree
 
 _TRUE = frozenset(["Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"])

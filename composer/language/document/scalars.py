@@ -13,8 +13,7 @@ from typing import Any
 from composer.base.characters import INVISIBLE, UNSAFE, UNSAFE_IN_LINES
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import SourceFile, Span
-from composer.language.document.limits import MAX_INTEGER, MAX_NUMBER_LENGTH, MIN_INTEGER
-from composer.language.rules import FORBIDDEN_CHARACTER
+from composer.language.rules import FORBIDDEN_CHARACTER, MAX_INTEGER, MAX_NUMBER_LENGTH, MIN_INTEGER
 from composer.language.tree import ScalarValue
 
 _FORBIDDEN_IN_TEXT = re.compile(f"[{UNSAFE}]")

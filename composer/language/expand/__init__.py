@@ -13,11 +13,17 @@ from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, shown
 from composer.language import rules
-from composer.language.document.limits import Stopped, TooManyErrors
-from composer.language.expand.arguments import default_problems, typed
+from composer.language.expand.arguments import (
+    Scope,
+    default_problems,
+    dependency_order,
+    measure,
+    read_scope,
+    typed,
+)
 from composer.language.expand.copies import SECTIONS, expand_section
-from composer.language.expand.scope import Scope, dependency_order, measure, read_scope
 from composer.language.expand.substitution import Substitution, references
+from composer.language.rules import Stopped, TooManyErrors
 from composer.language.schema import kind_of
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar
 

@@ -19,10 +19,10 @@ from math import prod
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.base.source import Span
 from composer.language import rules
-from composer.language.document.limits import MAX_COPIES
 from composer.language.expand.arguments import Declared, as_bool
 from composer.language.expand.substitution import Substitution, has_reference, pieces, references
 from composer.language.expressions import EvaluationError, ExpressionError, compile_expression
+from composer.language.rules import MAX_COPIES
 from composer.language.tree import (
     Entry,
     LeftOut,

@@ -11,16 +11,17 @@ from composer.base.diagnostics import Diagnostic, Label, Rule, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language import rules
-from composer.language.document.limits import (
+from composer.language.expand.arguments import Scope, Sized
+from composer.language.rules import (
+    DUPLICATE_KEY,
     MAX_BYTES,
     MAX_COPIES,
     MAX_DEPTH,
     MAX_VALUES,
+    TOO_LARGE,
     LimitedDiagnostics,
     Stopped,
 )
-from composer.language.expand.scope import Scope, Sized
-from composer.language.rules import DUPLICATE_KEY, TOO_LARGE
 from composer.language.tree import Entry, Mapping, Scalar, Sequence, Tree, count_values, describe
 
 _MARK = "${"

@@ -14,7 +14,7 @@ from composer.base.diagnostics import Diagnostic, error, nearest, shown
 from composer.base.folders import schemas_folder
 from composer.base.source import SourceFile
 from composer.language import rules
-from composer.language.document.limits import MAX_ERRORS
+from composer.language.rules import MAX_ERRORS
 from composer.language.schema.explanations import explain_errors
 from composer.language.schema.hints import intended_key
 from composer.language.schema.validation import schema_errors

@@ -10,7 +10,7 @@ from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language import rules
-from composer.language.document.limits import MAX_ERRORS, LimitedDiagnostics, TooManyErrors
+from composer.language.rules import MAX_ERRORS, LimitedDiagnostics, TooManyErrors
 from composer.language.schema.hints import (
     EXAMPLES,
     advice,

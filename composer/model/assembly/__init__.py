@@ -14,8 +14,14 @@ from types import MappingProxyType
 from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span
-from composer.language.document.limits import LimitedDiagnostics, Stopped, TooManyErrors
-from composer.language.rules import CYCLE, DUPLICATE_NAME, TOO_LARGE
+from composer.language.rules import (
+    CYCLE,
+    DUPLICATE_NAME,
+    TOO_LARGE,
+    LimitedDiagnostics,
+    Stopped,
+    TooManyErrors,
+)
 from composer.language.tree import Entry, LeftOut, Mapping, entries, is_opaque
 from composer.model.assembly.include_entries import IncludeReader, SystemFile
 from composer.model.assembly.includes import IncludeResolver

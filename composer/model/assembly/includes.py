@@ -10,9 +10,8 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.language.document.limits import MAX_INCLUDE_DEPTH
 from composer.language.expand import expand, missing_names
-from composer.language.rules import CYCLE, EMPTY_COLLECTION, MISSING_VARIABLE
+from composer.language.rules import CYCLE, EMPTY_COLLECTION, MAX_INCLUDE_DEPTH, MISSING_VARIABLE
 from composer.language.schema import SYSTEM, check_schema, with_intended_sections
 from composer.language.tree import (
     Entry,

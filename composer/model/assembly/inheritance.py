@@ -10,8 +10,7 @@ from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile
 from composer.language.document import read_document
-from composer.language.document.limits import MAX_INCLUDE_DEPTH, Stopped
-from composer.language.rules import CYCLE
+from composer.language.rules import CYCLE, MAX_INCLUDE_DEPTH, Stopped
 from composer.language.schema import NODE, check_kind, with_intended_sections
 from composer.language.tree import Mapping, count_values, text
 from composer.model.assembly.limits import UNKNOWN_BASE, SystemLimits, exceeded

@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, error
 from composer.base.source import Span
-from composer.language.document.limits import (
+from composer.language.rules import (
     MAX_BYTES,
     MAX_DECLARED_VALUES,
     MAX_INCLUDED_VALUES,
     MAX_INCLUDES,
     MAX_MATCHES,
     MAX_PASSED_SECTIONS,
+    TOO_LARGE,
     Stopped,
     TooManyErrors,
 )
-from composer.language.rules import TOO_LARGE
 
 INVALID_INCLUDE = error("RC290", "invalid-include")
 UNKNOWN_OVERRIDE = error("RC293", "unknown-override")

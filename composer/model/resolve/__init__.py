@@ -14,7 +14,7 @@ from types import MappingProxyType
 from composer.base.diagnostics import Diagnostic, in_order
 from composer.base.source import SourceFile
 from composer.language import schema
-from composer.language.document.limits import TooManyErrors
+from composer.language.rules import TooManyErrors
 from composer.language.schema import check_kind, kind_of
 from composer.language.tree import Mapping
 from composer.model import System

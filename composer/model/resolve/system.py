@@ -9,7 +9,7 @@ from functools import cache, partial
 
 from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, SourceFile, Span
-from composer.language.document.limits import LimitedDiagnostics
+from composer.language.rules import LimitedDiagnostics
 from composer.language.tree import (
     Entry,
     Mapping,

@@ -14,8 +14,13 @@ from functools import cached_property
 
 from composer.base.fast_dataclass import dataclass
 from composer.interfaces import Field, FieldType, Interfaces, Message, parts
-from composer.interfaces.field_types.constants import constant_problem, enumerator_problem
-from composer.interfaces.field_types.types import ANYTHING, ValueType, fields_of
+from composer.interfaces.field_types.types import (
+    ANYTHING,
+    ValueType,
+    constant_problem,
+    enumerator_problem,
+    fields_of,
+)
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.checker.copies import callback_signatures

@@ -13,9 +13,8 @@ from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located, Span
 from composer.interfaces import Action, Interfaces, Message, Service
 from composer.interfaces.definitions import parts
-from composer.language.document.limits import MAX_FINDINGS
 from composer.language.expressions import Expression, FieldPath
-from composer.language.rules import TOO_LARGE
+from composer.language.rules import MAX_FINDINGS, TOO_LARGE
 from composer.model import Channel, ChannelKind, HostedClass, Node, Port, System, channels
 from composer.model.scenario import Scenario
 from composer.project.node_types import NodeTypes

@@ -9,7 +9,6 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Message
 from composer.interfaces.field_types.checker import FieldChecker
-from composer.interfaces.field_types.constants import constant_problem
 from composer.interfaces.field_types.types import (
     ANYTHING,
     BOOL,
@@ -19,6 +18,7 @@ from composer.interfaces.field_types.types import (
     STRING,
     Problem,
     ValueType,
+    constant_problem,
     described,
     is_bool,
     is_number,
