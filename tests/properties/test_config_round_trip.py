@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 from composer.base.folders import systems_folder
 from composer.base.source import SourceFile
 from composer.language.document import parse_document
-from composer.language.document.writer import write_document
+from composer.language.document.writer import canonical, write_document
 from composer.language.tree import Mapping, plain
 from composer.loading import gives_same_model, load
 from composer.loading.reported import LoadResult
-from composer.model.assembly.canonical import canonical
 from tests.examples import examples
 from tests.properties.mutation import maps, trees
 from tests.properties.validating import SHIPPED

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic
 from composer.base.source import SourceFile
 from composer.language.document import parse_bytes, parse_document
-from composer.language.document.limits import MAX_INTEGER, MIN_INTEGER
+from composer.language.rules import MAX_INTEGER, MIN_INTEGER
 from composer.language.tree import Mapping, Plain, Scalar, Sequence, Tree, plain
 from tests.examples import examples
 from tests.unit.support import resolving

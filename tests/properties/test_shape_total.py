@@ -7,9 +7,9 @@ import json
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from composer.language.document.limits import MAX_VALUES
 from composer.language.expand import expand, missing_names
-from composer.language.expand.scope import measure
+from composer.language.expand.arguments import measure
+from composer.language.rules import MAX_VALUES
 from composer.language.schema import SCHEMAS, check_schema, schema
 from composer.language.tree import Mapping, Plain, plain
 from tests.examples import examples

@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from hypothesis import example, given
 
-from composer.language.document.writer import write_document
+from composer.language.document.writer import canonical, write_document
 from composer.language.rules import UNUSED_DECLARATION
 from composer.loading import load
 from composer.loading.reported import collect_diagnostics
-from composer.model.assembly.canonical import canonical
 from tests.examples import examples
 from tests.properties.surfaces import SURFACES, TEXTS
 from tests.properties.validating import INTERFACES, check_diagnostics, validate_and_check

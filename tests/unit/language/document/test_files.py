@@ -11,7 +11,7 @@ import pytest
 
 from composer.base.diagnostics import Diagnostic
 from composer.language.document import parse_bytes, read_document
-from composer.language.document.limits import MAX_BYTES
+from composer.language.rules import MAX_BYTES
 
 
 def diagnostic_for(path: Path) -> Diagnostic:

@@ -10,7 +10,7 @@ import pytest
 
 from composer.base.source import SourceFile
 from composer.language.document import parse_bytes, parse_document
-from composer.language.document.limits import MAX_BYTES, MAX_DEPTH, MAX_ERRORS, MAX_VALUES
+from composer.language.rules import MAX_BYTES, MAX_DEPTH, MAX_ERRORS, MAX_VALUES
 
 #: Of CPU time, so that a busy machine makes no difference.
 SECONDS_ALLOWED = 20.0
