@@ -70,11 +70,12 @@ def _unbound(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
     for method in unbound.values():
         if nearest(method.name, {handler.name for handler in missing}) is not None:
             continue  # shown by the diagnostic about the missing handler
-        message = f"handler '{method.name}' of '{source.reference.class_name}' matches no port or"
+        message = (
+            f"handler '{method.name}' of '{source.reference.class_name}' matches no port or timer"
+        )
         label = Label(source.reference.text.span, "the behavior of this node")
         hint = _hint(node, method.name, [handler.name for handler in bound])
         given = (("port", f"{node.name}.{_stem(method.name)}"),)
-        message = f"{message} timer"
         yield Diagnostic(
             HANDLER_WITHOUT_PORT, message, method.span, (label,), hint, relies_on=given
         )

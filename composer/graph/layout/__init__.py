@@ -1,9 +1,9 @@
 """Layered graph drawing with nested frames (Sugiyama, Tagawa and Toda, 1981).
 
-The steps are: sizes of texts (``measure``), rank assignment (``ranks``), boxes for vertices, labels
-and bends (``build``), ordering with few crossings (``ordering``), coordinate assignment
-(``coordinates``) and edge routing (``routing``). ``layered`` runs them on a connected graph, and
-``pages`` puts several of its results on a page. A frame is one lane across the ranks, so frames
+The steps are: sizes of texts (``geometry``), rank assignment (``ordering``), boxes for vertices,
+labels and bends (``build``), ordering with few crossings (``ordering``), coordinate assignment
+(``coordinates``) and edge routing (``routing``). ``pages`` runs them on each connected graph, and
+puts the results on a page. A frame is one lane across the ranks, so frames
 never overlap. Positions are in pixels, and the layout is deterministic.
 """
 

@@ -1,7 +1,7 @@
 """Diagrams as one self-contained HTML page: no network, no server, no installed program.
 
-``articles`` are the details of everything in the pictures. The style is in ``page.css`` and
-``picture.css``, the behavior in the ``.js`` files; both are put into the page.
+``articles`` are the details of everything in the pictures. They are put into ``page.html``, with
+the style in ``page.css`` and ``picture.css`` and the behavior in the ``.js`` files.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ import base64
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
+from string import Template
 
 from composer.graph.diagram import (
     Details,
@@ -195,37 +197,23 @@ def render(graphs: Sequence[Graph], shown: int = 0) -> str:
 
     The page first shows the picture at index ``shown``.
     """
-    return "\n".join(_lines(graphs, shown)) + "\n"
-
-
-def _lines(graphs: Sequence[Graph], shown: int) -> Iterator[str]:
-    title = text(graphs[0].title)
     script = _script()
-    yield "<!DOCTYPE html>"
-    yield '<html lang="en">'
-    yield "<head>"
-    yield '<meta charset="utf-8">'
-    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f'<meta http-equiv="Content-Security-Policy" content="{_policy(script)}">'
-    yield '<meta name="generator" content="compose graph">'
-    yield f"<title>{title}</title>"
-    yield f"<style>{page_style()}\n{_asset('page.css')}\n{_asset('picture.css')}</style>"
-    yield "<noscript><style>.listing{display:block}.tools{display:none}</style></noscript>"
-    yield "</head>"
-    yield "<body>"
-    yield from _toolbar(title, graphs, shown)
-    yield "<main>"
-    for index, graph in enumerate(graphs):
-        yield from _view(graph, shown=index == shown)
-    yield from _panel()
-    yield "</main>"
-    yield '<section class="listing" aria-label="All details">'
-    yield from articles(graphs)
-    yield "</section>"
-    yield f'<svg class="heads" aria-hidden="true">{markers()}</svg>'
-    yield f"<script>{script}</script>"
-    yield "</body>"
-    yield "</html>"
+    views = (_view(graph, shown=index == shown) for index, graph in enumerate(graphs))
+    return Template(_asset("page.html")).substitute(
+        title=text(graphs[0].title),
+        policy=_policy(script),
+        style=f"{page_style()}\n{_asset('page.css')}\n{_asset('picture.css')}",
+        tabs=_lines(_tabs([graph.view for graph in graphs], shown)),
+        filters=_lines(_filters(graphs)),
+        views=_lines(chain.from_iterable(views)),
+        articles=_lines(articles(graphs)),
+        markers=markers(),
+        script=script,
+    )
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _policy(script: str) -> str:
@@ -235,28 +223,6 @@ def _policy(script: str) -> str:
         f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}';"
         " base-uri 'none'; form-action 'none'"
     )
-
-
-def _toolbar(title: str, graphs: Sequence[Graph], shown: int) -> Iterator[str]:
-    yield '<header class="bar">'
-    yield f"<h1>{title}</h1>"
-    yield '<div class="tools">'
-    yield from _tabs([graph.view for graph in graphs], shown)
-    yield (
-        '<div class="search" role="search"><input type="search" id="search" autocomplete="off"'
-        ' spellcheck="false" placeholder="Search ( / )" aria-label="Search names, types, notes">'
-        '<output id="matches" for="search" aria-live="polite"></output></div>'
-    )
-    yield from _filters(graphs)
-    yield (
-        '<div class="group" role="group" aria-label="Zoom">'
-        '<button type="button" data-zoom="out" aria-label="Zoom out" title="-">-</button>'
-        '<button type="button" data-zoom="in" aria-label="Zoom in" title="+">+</button>'
-        '<button type="button" data-zoom="fit" title="Show everything (0)">Fit</button></div>'
-    )
-    yield '<button type="button" id="appearance" title="Light or dark">Theme: auto</button>'
-    yield "</div>"
-    yield "</header>"
 
 
 def _tabs(views: Sequence[str], shown: int) -> Iterator[str]:
@@ -315,14 +281,6 @@ def _view(graph: Graph, *, shown: bool) -> Iterator[str]:
     yield '<g class="world">'
     yield from contents(graph, layout)
     yield "</g></svg></section>"
-
-
-def _panel() -> Iterator[str]:
-    yield '<aside id="details" aria-label="Details" tabindex="-1" hidden>'
-    yield '<button type="button" id="close" aria-label="Close details">Close</button>'
-    yield '<div id="about"></div>'
-    yield '<nav id="neighbors" aria-label="Connected to"></nav>'
-    yield "</aside>"
 
 
 def _script() -> str:
