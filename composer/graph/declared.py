@@ -16,14 +16,7 @@ from composer.graph.facts import (
     qos_label,
     transform_facts,
 )
-from composer.graph.scene import (
-    ExecutorGroup,
-    Scene,
-    SceneNode,
-    ScenePort,
-    SceneTransform,
-    Wait,
-)
+from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort, SceneTransform, Wait
 from composer.model import (
     DEFAULT_EXECUTOR,
     Executor,

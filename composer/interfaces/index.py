@@ -9,14 +9,7 @@ from pathlib import Path
 from composer.base.diagnostics import nearest, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile, Span, shown_path
-from composer.interfaces.definitions import (
-    Action,
-    Field,
-    Interface,
-    Message,
-    Service,
-    parts,
-)
+from composer.interfaces.definitions import Action, Field, Interface, Message, Service, parts
 from composer.interfaces.parser import (
     SEPARATOR,
     DefinitionError,

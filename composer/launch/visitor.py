@@ -37,12 +37,7 @@ from launch.launch_description_sources import AnyLaunchDescriptionSource
 from launch.substitutions import TextSubstitution
 from launch.utilities.type_utils import perform_typed_substitution
 from launch_ros import parameter_descriptions
-from launch_ros.actions import (
-    ComposableNodeContainer,
-    LifecycleNode,
-    LoadComposableNodes,
-    Node,
-)
+from launch_ros.actions import ComposableNodeContainer, LifecycleNode, LoadComposableNodes, Node
 from launch_ros.actions.load_composable_nodes import get_composable_node_load_request
 from rclpy.parameter import parameter_value_to_python
 

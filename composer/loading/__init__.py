@@ -14,13 +14,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from composer.base.diagnostics import (
-    Diagnostic,
-    has_errors,
-    in_order,
-    registered_rules,
-    shown,
-)
+from composer.base.diagnostics import Diagnostic, has_errors, in_order, registered_rules, shown
 from composer.interfaces import Interfaces
 from composer.language.document import parse_bytes
 from composer.language.expand import missing_names

@@ -16,12 +16,7 @@ from composer.language import schema
 from composer.language.document import read_document
 from composer.language.expand import expand
 from composer.language.rules import MAX_ENTRIES, MAX_NODES, TOO_LARGE
-from composer.language.schema import (
-    check_kind,
-    check_schema,
-    kind_of,
-    with_intended_sections,
-)
+from composer.language.schema import check_kind, check_schema, kind_of, with_intended_sections
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree, entries
 from composer.language.tree import Sequence as ListTree
 from composer.model.assembly import (

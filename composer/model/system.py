@@ -24,13 +24,7 @@ from composer.model.node import (
     UnknownKey,
     by_name,
 )
-from composer.model.ports import (
-    ChannelKind,
-    Delivery,
-    Isolation,
-    Port,
-    Qos,
-)
+from composer.model.ports import ChannelKind, Delivery, Isolation, Port, Qos
 
 #: The end of the topic with the requests and responses of a service: ROS 2's introspection.
 EVENT_TOPIC = "_service_event"

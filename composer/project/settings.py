@@ -9,15 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
-from composer.base.diagnostics import (
-    Diagnostic,
-    Rule,
-    Severity,
-    error,
-    shown,
-    suggestion,
-    warning,
-)
+from composer.base.diagnostics import Diagnostic, Rule, Severity, error, shown, suggestion, warning
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span, shown_path
 from composer.language.document import read_document

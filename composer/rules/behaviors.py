@@ -11,12 +11,7 @@ from composer.base.diagnostics import Diagnostic, Label, error, nearest, suggest
 from composer.base.source import Span
 from composer.model import Node, PortKind
 from composer.python_code.lookup import BehaviorSource
-from composer.python_code.nodes import (
-    GENERAL_HANDLERS,
-    Handler,
-    handlers,
-    reached_methods,
-)
+from composer.python_code.nodes import GENERAL_HANDLERS, Handler, handlers, reached_methods
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method, scopes_in
 from composer.python_code.trees import (
@@ -32,13 +27,7 @@ from composer.python_code.trees import (
 from composer.rules.analysis.context import Context, behaviors, distinct_behaviors
 from composer.rules.analysis.formatting import a
 from composer.rules.analysis.subjects import wiring
-from composer.rules.python import (
-    CLASS_MISSING,
-    WRONG_MESSAGE_TYPE,
-    as_warning,
-    missing,
-    unnamed,
-)
+from composer.rules.python import CLASS_MISSING, WRONG_MESSAGE_TYPE, as_warning, missing, unnamed
 
 MISSING_HANDLER = error("RC433", "missing-handler")
 HANDLER_WITHOUT_PORT = error("RC434", "handler-without-port")

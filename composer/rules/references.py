@@ -8,14 +8,7 @@ from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, Subject, error, suggestion
 from composer.base.source import Located
-from composer.model import (
-    DEFAULT_EXECUTOR,
-    Connection,
-    Endpoint,
-    Node,
-    PortKind,
-    System,
-)
+from composer.model import DEFAULT_EXECUTOR, Connection, Endpoint, Node, PortKind, System
 from composer.rules.analysis.context import Context, is_unresolved, location, part_of
 from composer.rules.analysis.expressions import SENDERS, sends
 from composer.rules.analysis.formatting import a

@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from composer.cli.support.bags import (
-    SplitMb,
-    SplitS,
-    Topics,
-    bag_errors,
-    show_progress,
-    size_text,
-)
+from composer.cli.support.bags import SplitMb, SplitS, Topics, bag_errors, show_progress, size_text
 from composer.cli.support.errors import CommandError, UsageError
 from composer.cli.support.options import DEFAULT_TIMEOUT_S, Timeout, examples, quantity
 from composer.cli.support.ros import ros_session

@@ -12,12 +12,7 @@ from starlette.websockets import WebSocket
 
 from composer.base.fast_dataclass import dataclass
 from composer.dashboard.context import Dashboard
-from composer.dashboard.foxglove.catalog import (
-    Catalog,
-    CatalogFeed,
-    Contents,
-    changes,
-)
+from composer.dashboard.foxglove.catalog import Catalog, CatalogFeed, Contents, changes
 from composer.dashboard.foxglove.encoding import (
     CDR,
     WARNING,

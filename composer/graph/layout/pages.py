@@ -13,12 +13,7 @@ from functools import partial
 from composer.graph.diagram import Cluster, Direction, Edge, Graph, Vertex, natural_order
 from composer.graph.layout.boxes import Item
 from composer.graph.layout.build import Parts, build
-from composer.graph.layout.coordinates import (
-    Extent,
-    assign_coordinates,
-    extent_of,
-    rank_extents,
-)
+from composer.graph.layout.coordinates import Extent, assign_coordinates, extent_of, rank_extents
 from composer.graph.layout.geometry import (
     Frame,
     Layout,

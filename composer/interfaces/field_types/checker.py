@@ -29,15 +29,7 @@ from composer.interfaces.field_types.types import (
     type_of,
 )
 from composer.language.expressions import Expression
-from composer.language.templates import (
-    Computed,
-    Constant,
-    Formatted,
-    Items,
-    Record,
-    Template,
-    Text,
-)
+from composer.language.templates import Computed, Constant, Formatted, Items, Record, Template, Text
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,14 +10,7 @@ from typing import TypeAlias
 from composer.base.diagnostics import shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.interfaces import (
-    FLOATS,
-    INTEGER_RANGES,
-    TEXTS,
-    FieldType,
-    Interfaces,
-    Message,
-)
+from composer.interfaces import FLOATS, INTEGER_RANGES, TEXTS, FieldType, Interfaces, Message
 from composer.language.expressions import map_key
 from composer.language.tree import Plain, ScalarValue
 

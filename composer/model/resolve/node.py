@@ -62,10 +62,7 @@ from composer.model.resolve.node_settings import (
 from composer.model.resolve.node_types import NodeTypeLoader
 from composer.model.resolve.overrides import Overrides
 from composer.model.resolve.parameter_files import ParameterFiles
-from composer.model.resolve.parameters import (
-    GivenValues,
-    node_parameters,
-)
+from composer.model.resolve.parameters import GivenValues, node_parameters
 from composer.model.resolve.qos import QosTable
 from composer.project.node_types import SourceFolders
 

@@ -6,12 +6,7 @@ from collections.abc import Iterator
 from dataclasses import field
 from pathlib import Path
 
-from composer.base.diagnostics import (
-    Diagnostic,
-    Label,
-    has_errors,
-    shown,
-)
+from composer.base.diagnostics import Diagnostic, Label, has_errors, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.language.expand import expand, missing_names

@@ -47,20 +47,12 @@ from composer.model.assembly.limits import SystemLimits
 from composer.model.hosts import DEFAULT_SERVER_PORT, Discovery, DiscoveryKind
 from composer.model.names import join
 from composer.model.resolve.connections import read_chains, read_connections
-from composer.model.resolve.node import (
-    SystemContext,
-    resolve_node,
-)
-from composer.model.resolve.node_settings import (
-    read_supervision,
-)
+from composer.model.resolve.node import SystemContext, resolve_node
+from composer.model.resolve.node_settings import read_supervision
 from composer.model.resolve.node_types import NodeTypeLoader
 from composer.model.resolve.overrides import Overrides
 from composer.model.resolve.parameter_files import read_parameter_files
-from composer.model.resolve.parameters import (
-    sections_of,
-    without_sections_of_others,
-)
+from composer.model.resolve.parameters import sections_of, without_sections_of_others
 from composer.model.resolve.qos import qos_table
 from composer.model.system import Recording
 from composer.project.node_types import SourceFolders

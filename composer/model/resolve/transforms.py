@@ -20,12 +20,7 @@ from composer.language.tree import (
     text_or_opaque,
     texts,
 )
-from composer.model import (
-    DynamicTransform,
-    StaticTransform,
-    Transforms,
-    transform_ports,
-)
+from composer.model import DynamicTransform, StaticTransform, Transforms, transform_ports
 from composer.model.transforms import IDENTITY, Quaternion, Transform, Vector, quaternion_of_angles
 
 _ANGLES = ("roll", "pitch", "yaw")

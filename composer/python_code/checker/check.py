@@ -66,11 +66,7 @@ class Check:
         # Most code has no findings, and these modules take 10 ms of each start.
         from composer.python_code.checker.findings import Reader  # noqa: PLC0415 - slow
         from composer.python_code.checker.imports import Owners  # noqa: PLC0415 - slow
-        from composer.python_code.checker.relevance import (  # noqa: PLC0415 - slow
-            CodeIndex,
-            Relevance,
-            changed_names,
-        )
+        from composer.python_code.checker.relevance import CodeIndex, Relevance, changed_names  # noqa: PLC0415 - slow
 
         owners = Owners(self._stubs)
         codes = {path: CodeIndex(self._copies[path].module) for path in places}

@@ -18,11 +18,7 @@ from composer.interfaces import Interfaces
 from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.lookup import BehaviorSource, BrokenModule
-from composer.python_code.stubs.behaviors import (
-    behavior_class_name,
-    behavior_module,
-    message_stubs,
-)
+from composer.python_code.stubs.behaviors import behavior_class_name, behavior_module, message_stubs
 from composer.python_code.stubs.folder import LIBRARIES, api_stub
 from composer.python_code.syntax import Module
 from composer.typed import SUFFIX

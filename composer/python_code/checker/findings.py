@@ -25,12 +25,7 @@ from composer.python_code.checker.relevance import (
 )
 from composer.python_code.nodes import API_NAMES
 from composer.python_code.problems import Family, Problem
-from composer.python_code.trees import (
-    Function,
-    is_none,
-    name_span,
-    positional_arguments,
-)
+from composer.python_code.trees import Function, is_none, name_span, positional_arguments
 
 _FAMILIES = {
     "invalid-syntax": Family.SYNTAX,
