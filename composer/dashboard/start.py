@@ -37,10 +37,7 @@ class Address:
 
 
 def run_dashboard(
-    address: Address,
-    options: Options,
-    declared: Declared | None,
-    on_ready: Callable[[str], None],
+    address: Address, options: Options, declared: Declared | None, on_ready: Callable[[str], None]
 ) -> None:
     """Serve until a signal; ``on_ready`` gets the URL with the token.
 

@@ -52,10 +52,7 @@ class _Mark:
 
 
 def render(
-    diagnostics: Sequence[Diagnostic],
-    *,
-    color: bool = False,
-    maximum: int | None = MAX_DIAGNOSTICS,
+    diagnostics: Sequence[Diagnostic], *, color: bool = False, maximum: int | None = MAX_DIAGNOSTICS
 ) -> str:
     """Return the diagnostics, separated by blank lines, and the summary of all of them.
 

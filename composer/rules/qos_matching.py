@@ -226,12 +226,7 @@ def _incompatible(channel: Channel, conflicts: list[QosConflict]) -> Diagnostic:
         if first.policy in end.port.qos.overridden
     )
     return Diagnostic(
-        QOS_INCOMPATIBLE,
-        message,
-        first.place,
-        tuple(labels),
-        "; ".join(hints),
-        relies_on=overrides,
+        QOS_INCOMPATIBLE, message, first.place, tuple(labels), "; ".join(hints), relies_on=overrides
     )
 
 

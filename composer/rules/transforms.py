@@ -225,8 +225,5 @@ def _slash_in_field(content: Template) -> Iterator[Diagnostic]:
 def _slash(value: object, span: Span) -> Iterator[Diagnostic]:
     if isinstance(value, str) and value.startswith("/"):
         yield Diagnostic(
-            FRAME_ID_SLASH,
-            f"frame ID '{value}' begins with a slash",
-            span,
-            hint="remove the slash",
+            FRAME_ID_SLASH, f"frame ID '{value}' begins with a slash", span, hint="remove the slash"
         )

@@ -176,9 +176,7 @@ def _mismatches(context: Context) -> Iterator[TypeMismatch]:
 
 
 def _mismatch(
-    channel: Channel,
-    by_type: dict[str, list[PortOfNode]],
-    troubled: set[tuple[str, str] | None],
+    channel: Channel, by_type: dict[str, list[PortOfNode]], troubled: set[tuple[str, str] | None]
 ) -> TypeMismatch:
     """Choose the usual type: one that fits what its nodes do, then the most common.
 

@@ -162,11 +162,7 @@ def _as_sidecar(container: dict[str, Any]) -> dict[str, Any]:
 
 
 def _container(
-    service: Service,
-    contents: Contents,
-    environment: Mapping[str, str],
-    *,
-    shares_memory: bool,
+    service: Service, contents: Contents, environment: Mapping[str, str], *, shares_memory: bool
 ) -> dict[str, Any]:
     variables = [
         {"name": name, "value": without_variables(value)}

@@ -147,11 +147,7 @@ class _ClassReader:
                 self.name = _node_name(scope, call)
 
     def _add_port(
-        self,
-        scope: Scope,
-        call: ast.Call,
-        creator: tuple[PortKind, tuple[str, ...]],
-        place: str,
+        self, scope: Scope, call: ast.Call, creator: tuple[PortKind, tuple[str, ...]], place: str
     ) -> None:
         kind, names = creator
         given = _arguments(call, names)

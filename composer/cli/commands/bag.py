@@ -82,10 +82,7 @@ def convert(
     _write([bag], selection(None, 0.0, None), output, (split_mb, split_s))
 
 
-@bag_app.command(
-    "slice",
-    epilog=examples("compose bag slice run1 -o part --start 10 --duration 5"),
-)
+@bag_app.command("slice", epilog=examples("compose bag slice run1 -o part --start 10 --duration 5"))
 def cut(
     bag: BagPath,
     output: Output,
@@ -157,10 +154,7 @@ def diff(
 
 
 def _write(
-    paths: Sequence[Path],
-    chosen: Selection,
-    folder: Path,
-    split: tuple[float | None, float | None],
+    paths: Sequence[Path], chosen: Selection, folder: Path, split: tuple[float | None, float | None]
 ) -> None:
     with bag_errors():
         from composer.bags.editing import write_bag

@@ -120,12 +120,7 @@ def _settled(
 
 
 def _watched(
-    observer: GraphObserver,
-    compare: Compare,
-    timeout_s: float,
-    grace_s: float,
-    *,
-    json: bool,
+    observer: GraphObserver, compare: Compare, timeout_s: float, grace_s: float, *, json: bool
 ) -> tuple[Drift, ...]:
     """Print changes until Ctrl-C; return the remaining differences."""
     from composer.client.session import Deadline

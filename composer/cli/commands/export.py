@@ -45,11 +45,7 @@ NewPath = Annotated[
     "launch", epilog=examples("compose export launch pipeline -o launch/pipeline.launch.py")
 )
 def export_launch(
-    system: SystemName,
-    arguments: Arguments = None,
-    *,
-    output: NewFile = None,
-    force: Force = False,
+    system: SystemName, arguments: Arguments = None, *, output: NewFile = None, force: Force = False
 ) -> None:
     """Write a launch file that runs a system.
 
@@ -115,10 +111,7 @@ add_image_commands(export_app)
 
 
 @export_app.command(
-    "sros2",
-    epilog=examples(
-        "compose export sros2 pipeline -o policies/pipeline.xml",
-    ),
+    "sros2", epilog=examples("compose export sros2 pipeline -o policies/pipeline.xml")
 )
 def export_sros2(
     system: SystemName,

@@ -166,8 +166,7 @@ def _drawn(scene: Scene, form: Format, view: View, *, live: bool) -> bytes:
         return output.render(pictures, form, shown=views.index(view))
     except output.PngMissing as error:
         raise CommandError(
-            str(error),
-            hint='pip install "ros2-composer[png]"; or use -f svg',
+            str(error), hint='pip install "ros2-composer[png]"; or use -f svg'
         ) from error
 
 

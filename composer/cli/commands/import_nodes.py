@@ -107,8 +107,7 @@ def live(
     problem = why_too_large(text)
     if problem is not None:
         raise CommandError(
-            f"'compose validate' would refuse the file: {problem}",
-            hint="choose nodes with --node",
+            f"'compose validate' would refuse the file: {problem}", hint="choose nodes with --node"
         )
     write_output(text, output)
     _report_left_out(found.left_out)
@@ -116,9 +115,7 @@ def live(
 
 @import_app.command(
     "class",
-    epilog=examples(
-        "compose import class demo_nodes_py.topics.talker:Talker -o nodes/talker.yaml",
-    ),
+    epilog=examples("compose import class demo_nodes_py.topics.talker:Talker -o nodes/talker.yaml"),
 )
 def import_class(
     reference: Annotated[

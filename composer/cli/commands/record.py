@@ -69,8 +69,7 @@ def record(
         quantity("SECONDS", "--for", help="Stop after this time.", show_default="until Ctrl-C"),
     ] = None,
     now: Annotated[
-        bool,
-        typer.Option("--now", help="Let the flight recorder of a running system write a bag."),
+        bool, typer.Option("--now", help="Let the flight recorder of a running system write a bag.")
     ] = False,
     split_mb: SplitMb = None,
     split_s: SplitS = None,

@@ -61,8 +61,7 @@ def replay(
     start: Start = 0.0,
     duration: Duration = None,
     rate: Annotated[
-        float,
-        quantity("FACTOR", "--rate", "-r", help="Speed of the replay.", min=0.001),
+        float, quantity("FACTOR", "--rate", "-r", help="Speed of the replay.", min=0.001)
     ] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", "-l", help="Start again at the end.")] = False,
     clock: Annotated[

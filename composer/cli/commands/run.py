@@ -83,8 +83,7 @@ def run(
     arguments: Arguments = None,
     *,
     help_arguments: Annotated[
-        bool,
-        typer.Option("--help-arguments", help="List the arguments of the system and exit."),
+        bool, typer.Option("--help-arguments", help="List the arguments of the system and exit.")
     ] = False,
     run_for: Annotated[
         float | None,
@@ -94,7 +93,7 @@ def run(
         Time,
         typer.Option(
             help="'virtual' jumps whenever nothing is left to do: the same run every time. "
-            "Needs --for or --speed, and nodes of this process only.",
+            "Needs --for or --speed, and nodes of this process only."
         ),
     ] = Time.REAL,
     speed: Annotated[
@@ -195,8 +194,7 @@ def run(
         ),
     ] = False,
     grace: Annotated[
-        float,
-        quantity("SECONDS", "--grace", help="Maximum time for shutdown."),
+        float, quantity("SECONDS", "--grace", help="Maximum time for shutdown.")
     ] = 10.0,
 ) -> None:
     """Run a system.

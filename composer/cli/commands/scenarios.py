@@ -103,8 +103,7 @@ def test(
         ),
     ] = False,
     timeout: Annotated[
-        float,
-        quantity("SECONDS", "--timeout", help="Maximum real time of a run."),
+        float, quantity("SECONDS", "--timeout", help="Maximum real time of a run.")
     ] = 120.0,
 ) -> None:
     """Run scenarios, which say what systems must do.

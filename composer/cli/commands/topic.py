@@ -106,8 +106,7 @@ def pub(
     *,
     stdin: Stdin = False,
     rate: Annotated[
-        float,
-        quantity("HZ", "--rate", "-r", help="Messages per second.", min=0.001),
+        float, quantity("HZ", "--rate", "-r", help="Messages per second.", min=0.001)
     ] = 1.0,
     once: Annotated[
         bool, typer.Option("--once", "-1", help="Publish one message and exit.")

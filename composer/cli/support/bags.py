@@ -35,10 +35,7 @@ Topics = Annotated[
         show_default="all",
     ),
 ]
-Start = Annotated[
-    float,
-    quantity("SECONDS", "--start", help="Skip this much of the bag."),
-]
+Start = Annotated[float, quantity("SECONDS", "--start", help="Skip this much of the bag.")]
 Duration = Annotated[
     float | None,
     quantity(
@@ -59,8 +56,7 @@ SplitS = Annotated[
 
 
 Tolerance = Annotated[
-    float,
-    quantity("NUMBER", "--tolerance", help="Allowed difference of numbers."),
+    float, quantity("NUMBER", "--tolerance", help="Allowed difference of numbers.")
 ]
 TimeTolerance = Annotated[
     float | None,

@@ -66,8 +66,7 @@ ShowTypes = Annotated[bool, typer.Option("--show-types", "-t", help="Print the t
 
 #: The time limit of a command for everything that it waits for.
 Timeout = Annotated[
-    float,
-    quantity("SECONDS", "--timeout", help="Maximum time to wait for nodes and responses."),
+    float, quantity("SECONDS", "--timeout", help="Maximum time to wait for nodes and responses.")
 ]
 DEFAULT_TIMEOUT_S = 5.0
 #: As long as a transition may take by default, with a margin.

@@ -201,10 +201,7 @@ class LoadOptions(TypedDict, total=False):
 
 
 def load_system(
-    path: Path,
-    shown: str,
-    arguments: Iterable[str] | None = (),
-    **options: Unpack[LoadOptions],
+    path: Path, shown: str, arguments: Iterable[str] | None = (), **options: Unpack[LoadOptions]
 ) -> LoadResult:
     """Read and check the system in ``path``; print errors, and warnings as chosen, to stderr.
 

@@ -22,20 +22,14 @@ _GUARD = "composer.client.hosts.guard"
 
 
 def python_command(
-    host: Host,
-    words: Sequence[str],
-    environment: Mapping[str, str],
-    silence_s: float | None = None,
+    host: Host, words: Sequence[str], environment: Mapping[str, str], silence_s: float | None = None
 ) -> str:
     """Return :func:`python_words` as the command line that ssh sends."""
     return f"exec {shlex.join(python_words(host, words, environment, silence_s))}"
 
 
 def python_words(
-    host: Host,
-    words: Sequence[str],
-    environment: Mapping[str, str],
-    silence_s: float | None = None,
+    host: Host, words: Sequence[str], environment: Mapping[str, str], silence_s: float | None = None
 ) -> list[str]:
     """Return the command that runs Python with ``words`` in the workspace of a host, by a shell.
 

@@ -125,10 +125,7 @@ def wait_until_acknowledged(publisher: Publisher) -> bool:
 
 
 def _wait_for_subscriptions(
-    session: Session,
-    deadline: Deadline,
-    matched: Callable[[], int],
-    publication: Publication,
+    session: Session, deadline: Deadline, matched: Callable[[], int], publication: Publication
 ) -> None:
     if session.wait_for(lambda: matched() >= publication.wait_for or None, deadline) is None:
         hint = (

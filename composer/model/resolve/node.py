@@ -186,11 +186,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
 
 
 def _given_values(
-    name: str,
-    tree: Mapping,
-    declared: Declaration,
-    context: SystemContext,
-    ports: tuple[Port, ...],
+    name: str, tree: Mapping, declared: Declaration, context: SystemContext, ports: tuple[Port, ...]
 ) -> GivenValues:
     """Return the values for the parameters of the node with the key ``name`` and these ports."""
     is_inline = tree.entry("type") is None

@@ -177,11 +177,7 @@ def read_timers(node: Mapping, diagnostics: list[Diagnostic]) -> tuple[Timer, ..
 
 
 def _port(
-    kind: PortKind,
-    entry: Entry,
-    qos: QosTable,
-    isolation: Isolation,
-    diagnostics: list[Diagnostic],
+    kind: PortKind, entry: Entry, qos: QosTable, isolation: Isolation, diagnostics: list[Diagnostic]
 ) -> Port:
     span = entry.key.span
     tree = mapping(entry)

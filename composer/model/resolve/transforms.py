@@ -37,10 +37,7 @@ def read_transforms(entry: Entry | None) -> Transforms | None:
     listed = tree.get("lookup")
     lookup = Located(texts(listed), listed.span) if isinstance(listed, Sequence) else None
     ports = transform_ports(
-        span,
-        has_static=bool(static),
-        has_dynamic=bool(dynamic),
-        looks_up=lookup is not None,
+        span, has_static=bool(static), has_dynamic=bool(dynamic), looks_up=lookup is not None
     )
     return Transforms(span, static, dynamic, lookup, tuple(ports))
 
