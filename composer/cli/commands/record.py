@@ -16,11 +16,11 @@ from composer.cli.support.system_arguments import AnyRunningSystem, running_syst
 from composer.cli.support.terminal import say, write
 
 if TYPE_CHECKING:
-    from composer.bags.graph_recording import GraphRecording
     from composer.bags.recorder import Recorder
+    from composer.bags.ros_graph import GraphRecording
     from composer.bags.writer import BagWriter
     from composer.client.session import Deadline, Session
-    from composer.runtime.ros.endpoints import TopicInfo
+    from composer.runtime.ros_graph.endpoints import TopicInfo
 
 EPILOG = examples(
     "compose record                               all topics, until Ctrl-C",
@@ -150,9 +150,9 @@ def _record(
 ) -> None:
     """Record until Ctrl-C. Raises BagError."""
     from composer.bags.bag import BagError
-    from composer.bags.graph_recording import GraphRecording
     from composer.bags.recorder import Recorder
-    from composer.runtime.clock import COMPUTER
+    from composer.bags.ros_graph import GraphRecording
+    from composer.runtime.clock.clock import COMPUTER
 
     say(f"recording in {writer.folder}; press Ctrl-C to stop")
     recorder = Recorder(writer, COMPUTER)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from composer.bags.bag import Bag
     from composer.bags.comparing import Tolerances
     from composer.bags.editing import Selection
-    from composer.bags.graph_replay import ReplayOptions
+    from composer.bags.ros_graph import ReplayOptions
     from composer.testing.bag_replay import Replay
 
 EPILOG = examples(
@@ -137,7 +137,7 @@ def replay(
 
 def _options(rate: float, remap: list[str] | None, *, clock: bool) -> ReplayOptions:
     """Return the options. Raises UsageError."""
-    from composer.bags.graph_replay import ReplayOptions
+    from composer.bags.ros_graph import ReplayOptions
 
     names: dict[str, str] = {}
     for text in remap or ():
@@ -189,7 +189,7 @@ def _publish(
         ros_session("compose replay", timeout_s, carries_messages=True) as (session, _),
         Keys() as keys,
     ):
-        from composer.bags.graph_replay import GraphReplay
+        from composer.bags.ros_graph import GraphReplay
 
         progress = _Progress(bag, keys)
         options = replace(options, is_paused=progress.is_paused)
