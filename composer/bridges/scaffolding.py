@@ -18,14 +18,13 @@ from composer.base.folders import interfaces_folder, schemas_folder
 from composer.bridges.templates import filled
 from composer.interfaces import DefinitionError, Message, parse_definition
 from composer.interfaces.definitions import parts
-from composer.interfaces.sources import Bundle
+from composer.interfaces.sources import FOLDERS, Bundle
 
 #: For editors; compose has its own.
 _SCHEMAS = tuple(f"{kind}.schema.json" for kind in ("system", "node", "project", "scenario"))
 
 #: The contents of files, by their paths in the project.
 NewFiles: TypeAlias = dict[str, str]
-FOLDERS = ("msg", "srv", "action")
 #: What the generated code of each kind of interface uses, in addition to the types of its fields.
 _IMPLIED: Mapping[str, tuple[str, ...]] = {
     "msg": (),

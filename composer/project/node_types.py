@@ -22,7 +22,7 @@ from composer.project import Project
 #: The resource type in the ament index.
 RESOURCE_TYPE = "ros2_composer"
 _INDEX = Path("share", "ament_index", "resource_index", RESOURCE_TYPE)
-_SUFFIX = ".yaml"
+SUFFIX = ".yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class InstalledProject:
 
         ``colcon build --symlink-install`` makes links: these are the files that they lead to.
         """
-        files = sorted((self.folder / "systems").glob(f"*{_SUFFIX}"))
+        files = sorted((self.folder / "systems").glob(f"*{SUFFIX}"))
         return {file.stem: file.resolve() for file in files}
 
 
@@ -76,8 +76,6 @@ def _registered(prefix: Path) -> list[str]:
         return sorted(path.name for path in (prefix / _INDEX).iterdir() if path.is_file())
     return []
 
-
-SUFFIX = ".yaml"
 
 #: A node type is named by the stem of its file, which must not contain a path.
 _TYPE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")

@@ -21,7 +21,13 @@ import asyncssh
 
 from composer.base.fast_dataclass import dataclass
 from composer.client.hosts.connection import SILENCE_S, HostError, connect, failure_of, shown
-from composer.client.hosts.remote_command import NO_PYTHON, NO_SETUP, NO_WORKSPACE, python_command
+from composer.client.hosts.remote_command import (
+    GUARD,
+    NO_PYTHON,
+    NO_SETUP,
+    NO_WORKSPACE,
+    python_command,
+)
 from composer.model import Host, LogLevel, Process
 from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.output import OutputLines, attribute_line, process_loggers
@@ -40,7 +46,6 @@ _USAGE, _CONFIG = 2, 78
 _FINAL = (_USAGE, _CONFIG, NO_WORKSPACE, NO_SETUP, NO_PYTHON)
 #: What the composer logs in a process begins with that.
 _OF_COMPOSER = f"[{PROGRAM_LOGGER}] "
-_GUARD = "composer.client.hosts.guard"
 _SESSIONS = "a host needs one for each process: increase MaxSessions in its sshd_config"
 
 
@@ -123,7 +128,7 @@ class Deployment:
 
     async def _coordinate(self) -> int:
         """Run the coordinating process on this computer."""
-        words = (sys.executable, "-P", "-m", _GUARD, f"{SILENCE_S:g}", *self._options.compose)
+        words = (sys.executable, "-P", "-m", GUARD, f"{SILENCE_S:g}", *self._options.compose)
         process = await asyncio.create_subprocess_exec(
             *words,
             "run",

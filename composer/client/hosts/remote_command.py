@@ -18,7 +18,7 @@ _PASSED_ON = (
     "ROS_STATIC_PEERS",
 )
 _IN_WORKSPACE = ".venv/bin/python"
-_GUARD = "composer.client.hosts.guard"
+GUARD = "composer.client.hosts.guard"
 
 
 def python_command(
@@ -42,7 +42,7 @@ def python_words(
     lines = [f"cd {quoted_path(workspace(host))} || exit {NO_WORKSPACE}"]
     lines += [_source(quoted_path(script)) for script in host.setup]
     lines += [f"export {shlex.quote(f'{name}={value}')}" for name, value in passed.items()]
-    guard = "" if silence_s is None else f'"$python" -P -m {_GUARD} {silence_s:g} '
+    guard = "" if silence_s is None else f'"$python" -P -m {GUARD} {silence_s:g} '
     lines += [_python(host), f'exec {guard}"$python" -P {shlex.join(words)}']
     shell = "bash" if any(script.endswith(".bash") for script in host.setup) else "sh"
     return [shell, "-c", "; ".join(lines)]
