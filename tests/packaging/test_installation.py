@@ -35,6 +35,7 @@ def test_the_wheel_contains_all_shared_files_and_no_others(wheel: Path) -> None:
         "composer/share/systems/pipeline.yaml",
         "composer/graph/formats/html/main.js",
         "composer/graph/formats/html/page.css",
+        "composer/graph/formats/html/page.html",
         "composer/dashboard/page/index.html",
         "composer/dashboard/page/views/graph.js",
         "composer/dashboard/page/vendor/uplot/uPlot.esm.js",
