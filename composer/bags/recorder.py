@@ -16,7 +16,7 @@ from rclpy.serialization import serialize_message
 from composer.bags.bag import NANOSECONDS, BagError, BagMessage, BagTopic
 from composer.bags.writer import BagWriter
 from composer.model.qos import Durability
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 
 _SERIALIZE_PERIOD_S = 0.02
 _WRITE_PERIOD_S = 0.1

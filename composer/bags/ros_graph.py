@@ -28,8 +28,8 @@ from composer.interfaces import Interfaces
 from composer.model.names import is_hidden
 from composer.model.qos import QosProfile, incompatibilities, strictest_compatible, strongest
 from composer.model.system import owner_of_topic
-from composer.runtime.ros.qos_profiles import rclpy_profile
-from composer.runtime.ros_graph.endpoints import TopicInfo
+from composer.runtime.ros.conversions import rclpy_profile
+from composer.runtime.ros.endpoints import TopicInfo, topic_info
 
 #: Latched messages of a topic, and what arrives while this program is busy.
 _DEPTH = 1000
@@ -77,7 +77,7 @@ class GraphRecording:
             if is_new and len(self._subscriptions) + len(self._refused) >= MAX_TOPICS:
                 self._warn_of_limit()
                 continue
-            info = self._session.graph.topic(name, types)
+            info = topic_info(self._session.graph.node, name, types)
             if info.publishers and self._is_wanted(info):
                 self._subscribe(info, types)
 

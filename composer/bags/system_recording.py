@@ -18,7 +18,7 @@ from composer.interfaces import Interfaces
 from composer.model import System
 from composer.model.qos import QosProfile
 from composer.model.system import Recording
-from composer.runtime.clock.clock import Clock
+from composer.runtime.clock import Clock
 from composer.runtime.supervision.events import Event, NodeFailed
 
 #: The attachment with facts, and the time at which the process of the system began to start.

@@ -33,7 +33,7 @@ from composer.model import SEVERITIES, LogLevel
 from composer.model.names import is_hidden
 from composer.runtime.callbacks.log import logger_name
 from composer.runtime.protocol.requests import NAME, ParameterDescription
-from composer.runtime.ros.parameter_values import NOT_SET, description, plain_value
+from composer.runtime.ros.conversions import NOT_SET, description, plain_value
 
 T = TypeVar("T")
 #: How long to wait for the responses of nodes; the parameters of later ones have no description.

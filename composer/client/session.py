@@ -19,13 +19,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from composer.runtime.middleware import dds_profiles
-from composer.runtime.middleware.dds_participants import count_participants, enlarge_receive_buffers
+from composer.runtime.middleware import environment
 from composer.runtime.middleware.environment import ROS_ARGUMENTS
+from composer.runtime.middleware.local_resources import count_participants, enlarge_receive_buffers
 from composer.runtime.process import start_refused
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.requests import NAME
-from composer.runtime.ros_graph.graph import COMMAND_PREFIX, SETTLE_S, NodeName, RosGraph
+from composer.runtime.ros.graph import COMMAND_PREFIX, SETTLE_S, NodeName, RosGraph
 
 T = TypeVar("T")
 
@@ -67,12 +67,12 @@ class Deadline:
 
 
 def use_command_profile() -> None:
-    """Disable shared memory in this process: see :mod:`composer.runtime.middleware.dds_profiles`.
+    """Disable shared memory in this process: see :mod:`composer.runtime.middleware.environment`.
 
     For commands that carry no large messages. Call it before joining the ROS graph.
     """
     if get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
-        dds_profiles.use_command_profile(os.environ)
+        environment.use_command_profile(os.environ)
 
 
 class _SessionNode(Node):

@@ -21,8 +21,8 @@ from typing import Any, Self, TypeVar, cast
 
 from composer.behavior import Logger
 from composer.model import LogLevel, Port, PortKind
-from composer.model.geometry import Quaternion, Vector
 from composer.model.lifecycle import TRANSITIONS, available_transitions
+from composer.model.transforms import Quaternion, Vector
 from composer.runtime.clock import START_NS, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import sleep

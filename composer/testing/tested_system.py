@@ -10,7 +10,7 @@ from typing import Any, Self, TypeVar
 
 from composer.bags.system_recording import SystemRecording
 from composer.model import LogLevel, PortKind, System
-from composer.model.recording import Recording
+from composer.model.system import Recording
 from composer.runtime.clock import COMPUTER, START_NS, Clock, VirtualClock
 from composer.runtime.executors.futures import Future
 from composer.runtime.host_options import HostOptions

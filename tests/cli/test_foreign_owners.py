@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.client.run_log import Record
+from composer.client.run_log.reading import Record
 from tests.cli.compose import Done, compose, write_files
 
 #: In folders that only root can enter, the other user could not run any command.

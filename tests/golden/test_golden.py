@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from composer.base.diagnostics import Rule
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.loading import load, load_files
 from composer.plan import bring_up, tear_down
 from composer.report.text import render

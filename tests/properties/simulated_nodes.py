@@ -20,8 +20,13 @@ from composer.plan import Fault
 from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.futures import Future
 from composer.runtime.node.managed_node import TransitionOutcome
-from composer.runtime.supervision.main_queue import Item, MainQueue, NodeReturned, StepEnded
-from composer.runtime.supervision.node_listener import SupervisionListener
+from composer.runtime.supervision.main_queue import (
+    Item,
+    MainQueue,
+    NodeReturned,
+    StepEnded,
+    SupervisionListener,
+)
 from tests.unit.support.resolving import system_of
 
 T = TypeVar("T")

@@ -16,8 +16,12 @@ from composer.plan import Condition, DesiredState, Fault, FaultKind, reconcile
 from composer.runtime.clock import COMPUTER
 from composer.runtime.supervision.commands import Commands
 from composer.runtime.supervision.events import Reporter
-from composer.runtime.supervision.main_queue import Command, NodeEvent, SupervisionContext
-from composer.runtime.supervision.node_listener import SupervisionListener
+from composer.runtime.supervision.main_queue import (
+    Command,
+    NodeEvent,
+    SupervisionContext,
+    SupervisionListener,
+)
 from composer.runtime.supervision.reconciler import Reconciler
 from composer.runtime.supervision.status import Status
 from composer.runtime.supervision.supervisor import Supervisor

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import composer.typed
-from composer.base import resources
+from composer.base import folders
 from composer.behavior import Behavior
 from composer.typed import ArmBehavior
 from composer.typed import PlannerBehavior as Base
@@ -57,7 +57,7 @@ def test_every_class_of_composer_typed_is_the_base_class() -> None:
             getattr(composer.typed, name)
 
 
-BEHAVIORS = sorted(resources.nodes_folder().glob("*.py"))
+BEHAVIORS = sorted(folders.nodes_folder().glob("*.py"))
 
 
 def _imported_modules(path: Path) -> Iterator[str]:

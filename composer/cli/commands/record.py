@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from composer.bags.ros_graph import GraphRecording
     from composer.bags.writer import BagWriter
     from composer.client.session import Deadline, Session
-    from composer.runtime.ros_graph.endpoints import TopicInfo
+    from composer.runtime.ros.endpoints import TopicInfo
 
 EPILOG = examples(
     "compose record                               all topics, until Ctrl-C",
@@ -152,7 +152,7 @@ def _record(
     from composer.bags.bag import BagError
     from composer.bags.recorder import Recorder
     from composer.bags.ros_graph import GraphRecording
-    from composer.runtime.clock.clock import COMPUTER
+    from composer.runtime.clock import COMPUTER
 
     say(f"recording in {writer.folder}; press Ctrl-C to stop")
     recorder = Recorder(writer, COMPUTER)

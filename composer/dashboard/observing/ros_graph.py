@@ -19,8 +19,8 @@ from composer.dashboard.observing.topics import TopicMeters, TopicReader, Topolo
 from composer.plan.drift import ObservedEndpoint
 from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import SystemReport
-from composer.runtime.ros_graph.graph import SETTLE_S
-from composer.runtime.ros_graph.node_endpoints import endpoints
+from composer.runtime.ros.endpoints import endpoints
+from composer.runtime.ros.graph import SETTLE_S
 
 if TYPE_CHECKING:
     from composer.client.shared_session import SharedSession

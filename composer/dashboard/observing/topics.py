@@ -107,7 +107,7 @@ def first_topology() -> Topology | None:
     Ask before joining it: systems are not certain while they discover another process.
     """
     from composer.client.systems.local_queries import local_endpoints
-    from composer.runtime.ros_graph.graph import COMMAND_PREFIX
+    from composer.runtime.ros.graph import COMMAND_PREFIX
 
     answer = local_endpoints()
     if answer is None:

@@ -21,7 +21,7 @@ from unique_identifier_msgs.msg import UUID
 
 from composer.model import Isolation, Port
 from composer.model.qos import QosProfile
-from composer.model.recording import EVENT_TOPIC
+from composer.model.system import EVENT_TOPIC
 from composer.runtime.clock import Clock
 from composer.runtime.executors.sources import Reply
 from composer.runtime.host_options import Recorder

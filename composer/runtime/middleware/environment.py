@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.base.diagnostics import nearest
-from composer.base.ownership import TrustedUsers
+from composer.base.folders import TrustedUsers
 from composer.model.hosts import HIGHEST_DOMAIN_ID, domain_problem
 from composer.runtime.middleware.local_resources import (
     remove_dead_segments,

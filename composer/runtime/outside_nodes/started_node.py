@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
-from composer.base.regular_files import write_whole
+from composer.base.files import write_whole
 from composer.model import SEVERITIES, Executable, ExecutableKind, LogLevel, Node, Outside
 from composer.model.lifecycle import INACTIVE, UNCONFIGURED
 from composer.runtime.children.child_processes import Child, Command, StartFailed

@@ -20,7 +20,15 @@ from rclpy.time import Time
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import TF_STATIC_TOPIC, TF_TOPIC, Port, PortKind, Transforms
-from composer.model.geometry import Quaternion, Transform, Vector, apply, is_unit, multiply, rotate
+from composer.model.transforms import (
+    Quaternion,
+    Transform,
+    Vector,
+    apply,
+    is_unit,
+    multiply,
+    rotate,
+)
 from composer.runtime.clock import Clock
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken

@@ -23,15 +23,15 @@ from std_srvs.srv import Trigger
 from composer.bags.bag import BagError, BagMessage, BagTopic
 from composer.bags.comparing import Tolerances
 from composer.bags.editing import Selection
-from composer.bags.graph_recording import GraphRecording
 from composer.bags.reader import open_bag
 from composer.bags.recorder import Recorder
+from composer.bags.ros_graph import GraphRecording
 from composer.bags.writer import BagWriter
 from composer.client.session import Deadline, Session
 from composer.model.qos import PRESETS
-from composer.runtime.clock.clock import COMPUTER
+from composer.runtime.clock import COMPUTER
 from composer.testing.bag_replay import Replay, replay, without_nodes
-from composer.testing.system_run import load_system
+from composer.testing.declarations import load_file
 from tests.ros.bags.test_recording import calls_of_service, decoded_data
 from tests.ros.support.commands import compose, error, finished, output_of, start
 from tests.ros.support.forked import ForkedCommand
@@ -56,7 +56,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _replayed(bag: Path, **settings: float) -> Replay:
     named = {f"motor_controller.{name}": value for name, value in settings.items()}
-    system = without_nodes(load_system(PIPELINE, {}, named), ["sensor_*"])
+    system = without_nodes(load_file(PIPELINE, {}, named)[0], ["sensor_*"])
     return replay(system, open_bag(bag), Selection())
 
 
@@ -203,7 +203,7 @@ def test_a_type_that_is_not_installed_is_named(tmp_path: Path) -> None:
     bag = _chat(tmp_path, type_name="missing_msgs/msg/Chat")
     assert "interface 'missing_msgs/msg/Chat' is not installed" in error("replay", bag)
     with pytest.raises(BagError, match="has no node 'x'"):
-        without_nodes(load_system(PIPELINE, {}, {}), ["x"])
+        without_nodes(load_file(PIPELINE, {}, {})[0], ["x"])
 
 
 @pytest.fixture
@@ -255,7 +255,7 @@ def test_the_graph_is_recorded(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("publishing")
 def test_the_number_of_topics_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("composer.bags.graph_recording.MAX_TOPICS", 1)
+    monkeypatch.setattr("composer.bags.ros_graph.MAX_TOPICS", 1)
     warnings: list[str] = []
     writer = BagWriter(tmp_path / "bag")
     with Session() as session, Recorder(writer, COMPUTER) as recorder:

@@ -26,7 +26,7 @@ from composer.client.systems.local_queries import (
     local_report,
     local_reports,
 )
-from composer.runtime.intra_process import ignore_local_publications
+from composer.runtime.intra_process import dds_flags
 from composer.runtime.protocol.requests import KINDS
 from tests.ros.support.commands import (
     PATIENCE_S,
@@ -206,7 +206,7 @@ def differences(rules: Mapping[str, set[str]], text: str) -> tuple[list[str], li
 
 
 def test_the_policy_of_a_system_allows_every_endpoint_and_no_other() -> None:
-    assert f"/{ignore_local_publications.TEST_NODE}/*" == SELF_TEST_TOPICS
+    assert f"/{dds_flags.TEST_NODE}/*" == SELF_TEST_TOPICS
     root = ElementTree.fromstring(output_of("export", "sros2", "systems/pipeline.yaml"))
     profiles = {
         f"{item.get('ns', '').rstrip('/')}/{item.get('node')}": rules_of(item)

@@ -20,7 +20,7 @@ from composer.client.doctor.graph import check_types_built
 from composer.client.systems.local_queries import parse_state
 from composer.runtime.protocol.codec import VERSION, encode
 from composer.runtime.protocol.reports import NodeReport, SystemReport
-from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS
+from composer.runtime.ros.service_requests import CALLBACKS_QOS, STATE_QOS
 from tests.ros.support.commands import (
     PATIENCE_S,
     compose,

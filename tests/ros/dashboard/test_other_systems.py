@@ -28,7 +28,7 @@ from composer.runtime.protocol.reports import (
     SystemReport,
     TimingReport,
 )
-from composer.runtime.ros.manager_interface import CALLBACKS_QOS, STATE_QOS
+from composer.runtime.ros.service_requests import CALLBACKS_QOS, STATE_QOS
 from tests.ros.support.commands import hand_written, listed, running
 from tests.ros.support.dashboard import Dashboard, dashboard
 from tests.ros.support.in_process import Peer, wait_until

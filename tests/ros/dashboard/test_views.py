@@ -6,7 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from composer.client.run_log import find_runs, last_records
+from composer.client.run_log import find_runs
+from composer.client.run_log.reading import last_records
 from tests.ros.support.dashboard import Browser
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.system_process import RunningSystem

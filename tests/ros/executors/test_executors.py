@@ -16,8 +16,8 @@ from composer.base.source import Located, SourceFile, Span
 from composer.model import Executor, ExecutorKind
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.loop import Loop
-from composer.runtime.executors.placement import place_threads
 from composer.runtime.executors.tasks import sleep
+from composer.runtime.process.computer import place_threads
 from tests.ros.support.in_process import running, wait_until
 from tests.ros.support.loops import KINDS, PATIENCE_S, Bench, bench, loop_of, print_error
 

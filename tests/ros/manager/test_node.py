@@ -25,7 +25,7 @@ from composer.runtime.process import StartRefused
 from composer.runtime.protocol.codec import decode, encode
 from composer.runtime.protocol.reports import CallbackFigures, NodeReport, SystemReport
 from composer.runtime.protocol.requests import Instance
-from composer.runtime.ros.manager_interface import STATE_QOS
+from composer.runtime.ros.service_requests import STATE_QOS
 from composer.runtime.supervision.events import StateChanged, Stopping
 from composer.runtime.supervision.status import Status
 from tests.ros.support.commands import hand_written

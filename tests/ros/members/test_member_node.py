@@ -12,8 +12,7 @@ import pytest
 from composer.model import ExecutorKind, LogLevel
 from composer.runtime.executors.futures import Future
 from composer.runtime.members import node as member_node
-from composer.runtime.members.context import ProcessUnavailable
-from composer.runtime.members.lives import NodeFigures
+from composer.runtime.members.lives import NodeFigures, ProcessUnavailable
 from composer.runtime.members.node import MemberNode
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import TransitionOutcome

@@ -17,10 +17,12 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, String
 
-from composer.runtime.middleware.dds_participants import count_participants, ended_participants
-from composer.runtime.middleware.shared_memory import LARGE_SEGMENT_BYTES
-from composer.runtime.ros_graph.endpoints import UNKNOWN_NODE
-from composer.runtime.ros_graph.graph import RosGraph, participant
+from composer.runtime.middleware.local_resources import (
+    LARGE_SEGMENT_BYTES,
+    count_participants,
+    ended_participants,
+)
+from composer.runtime.ros.graph import UNKNOWN_NODE, RosGraph, participant
 from tests.ros.support.commands import PYTHON, compose, hand_written, running
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.raw_rmw import NodeNames, own_prefix

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import Trigger
 
-from composer.runtime.middleware.shared_memory import SHARED_MEMORY
+from composer.runtime.middleware.local_resources import SHARED_MEMORY
 from tests.ros.support.commands import COMPOSE
 from tests.ros.support.in_process import PATIENCE_S, Peer, running, wait_until
 from tests.ros.support.system_process import RunningSystem, write_system

@@ -16,11 +16,12 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from composer.client.calls import GoalClient
+from composer.client.lifecycle import active_dependents, inactive_dependents, lowered
 from composer.client.requests import wait_until_known
 from composer.client.session import Deadline, Session
 from composer.client.shared_session import InvalidHandle, SharedSession
-from composer.client.systems.lifecycle_batch import active_dependents, inactive_dependents, lowered
 from composer.runtime.protocol.reports import NodeReport
+from composer.runtime.ros.endpoints import topic_info
 from tests.ros.support.commands import hand_written
 from tests.ros.support.in_process import Peer, wait_until
 
@@ -140,7 +141,7 @@ class Observer:
         number = self._session.changes.number()
         if number != self._number:
             self._number = number
-            self._count = len(self._session.graph.topic("/text", ()).subscriptions)
+            self._count = len(topic_info(self._session.graph.node, "/text", ()).subscriptions)
         return self._count == count
 
 

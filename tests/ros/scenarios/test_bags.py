@@ -16,7 +16,7 @@ from composer.bags.reader import open_bag
 from composer.scenarios.runner import Result
 from composer.testing import SystemTest
 from composer.testing.bag_messages import shift_stamps
-from composer.testing.system_run import load_system
+from composer.testing.declarations import load_file
 from tests.ros.scenarios.conftest import compose_in, copied_to, run
 
 REPLAY = "replay: {bag: ../bag, replace: [sensor_simulator]"
@@ -54,7 +54,7 @@ def test_a_step_replays_a_bag(text: str, recorded: Path) -> None:
 
 
 def test_a_part_of_a_bag(recorded: Path) -> None:
-    loaded = load_system(recorded / "systems" / "pipeline.yaml", {}, {})
+    loaded, _ = load_file(recorded / "systems" / "pipeline.yaml", {}, {})
     with SystemTest(loaded.without_nodes(["sensor_*"]), record_to=recorded / "second") as system:
         replay = system.replay(recorded / "bag", ["/sensor_*"], start_s=1.0, duration_s=2.0)
         system.run_until(replay.done, 2.0)

@@ -16,7 +16,7 @@ from mcap.writer import CompressionType, Writer
 
 from composer.bags.bag import BagError, BagMessage, BagTopic
 from composer.bags.reader import open_bag
-from composer.bags.ring import Ring
+from composer.bags.recorder import Ring
 from tests.unit.bags.test_form import read
 
 #: Bytes of the message in a file of a few kilobytes, and what reading it may take.
@@ -103,7 +103,7 @@ def test_a_flight_recorder_whose_clock_is_set_back(
     monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
     """No message is old then, and small messages take more memory than their bytes."""
-    monkeypatch.setattr("composer.bags.ring.LARGEST_BYTES", 1_000_000)
+    monkeypatch.setattr("composer.bags.recorder.LARGEST_BYTES", 1_000_000)
     ring = Ring(seconds=10.0)
     ring.add_topic(BagTopic("/chat", "std_msgs/msg/String"))
     tracemalloc.start()

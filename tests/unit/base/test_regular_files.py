@@ -7,13 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.base import resources
-from composer.base.regular_files import (
-    FileTooLargeError,
-    NotRegularError,
-    read_regular,
-    write_whole,
-)
+from composer.base import folders
+from composer.base.files import FileTooLargeError, NotRegularError, read_regular, write_whole
 
 
 @pytest.fixture
@@ -69,5 +64,5 @@ def test_the_share_folder_of_a_wheel_wins_over_folders_next_to_the_package(
     package = tmp_path / "site-packages" / "composer"
     for folder in (package / "share" / "nodes", package.parent / "nodes"):
         folder.mkdir(parents=True)
-    monkeypatch.setattr(resources, "PACKAGE", package)
-    assert resources.nodes_folder() == package / "share" / "nodes"
+    monkeypatch.setattr(folders, "PACKAGE", package)
+    assert folders.nodes_folder() == package / "share" / "nodes"

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.graph.formats import html
 from composer.graph.output import Format, render
 from composer.graph.views import View, build_graph, scene_of
@@ -80,7 +80,7 @@ import hashlib, sys
 from composer.graph.views import View, build_graph, scene_of
 from composer.graph.output import Format, render
 from composer.loading import load
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 loading = load(systems_folder() / "navigation.yaml")
 scene = scene_of([loading.system], loading.diagnostics)
 graphs = [build_graph(scene, view) for view in View]

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from composer.base.characters import is_safe
-from composer.base.resources import systems_folder
+from composer.base.folders import systems_folder
 from composer.graph import output
 from composer.graph.diagram import (
     Cluster,

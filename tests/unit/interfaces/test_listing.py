@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.base.resources import interfaces_folder
+from composer.base.folders import interfaces_folder
 from composer.interfaces import Interfaces
-from composer.interfaces.listing import listing
+from composer.interfaces.index import listing
 from tests.unit.interfaces.test_index import package, prefix
 
 OUTER = """\

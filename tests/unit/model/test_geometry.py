@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from composer.model import geometry
-from composer.model.geometry import IDENTITY, Quaternion, Transform
+from composer.model import transforms
+from composer.model.transforms import IDENTITY, Quaternion, Transform
 
 np = pytest.importorskip("numpy", reason="comes with ROS")
 
@@ -24,7 +24,7 @@ RATIO = st.floats(0.0, 1.0)
 def quaternions(draw: st.DrawFn) -> Quaternion:
     values = draw(st.tuples(*[st.floats(-1.0, 1.0)] * 4))
     assume(math.hypot(*values) > 0.01)
-    return geometry.normalized(Quaternion(*values))
+    return transforms.normalized(Quaternion(*values))
 
 
 TRANSFORM = st.builds(Transform, VECTOR, quaternions())
@@ -55,31 +55,31 @@ def about(axis: int, angle: float) -> Any:
 
 @given(ANGLE, ANGLE, ANGLE)
 def test_angles_are_about_fixed_axes(roll: float, pitch: float, yaw: float) -> None:
-    rotation = geometry.quaternion_of_angles(roll, pitch, yaw)
+    rotation = transforms.quaternion_of_angles(roll, pitch, yaw)
     expected = about(2, yaw) @ about(1, pitch) @ about(0, roll)
     assert matrix(Transform((0.0, 0.0, 0.0), rotation))[:3, :3] == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_quarter_turn_is_to_the_left() -> None:
-    turn = geometry.quaternion_of_angles(0.0, 0.0, math.pi / 2)
+    turn = transforms.quaternion_of_angles(0.0, 0.0, math.pi / 2)
     assert turn == pytest.approx((0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
-    assert geometry.rotate(turn, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0))
+    assert transforms.rotate(turn, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0))
 
 
 @given(TRANSFORM, TRANSFORM, VECTOR)
 def test_composition(outer: Transform, inner: Transform, point: tuple[float, float, float]) -> None:
-    both = geometry.compose(outer, inner)
+    both = transforms.compose(outer, inner)
     expected = matrix(outer) @ matrix(inner)
     assert matrix(both) == pytest.approx(expected, abs=1e-6)
     moved = (expected @ [*point, 1.0])[:3]
-    assert geometry.apply(outer, geometry.apply(inner, point)) == pytest.approx(moved, abs=1e-6)
+    assert transforms.apply(outer, transforms.apply(inner, point)) == pytest.approx(moved, abs=1e-6)
 
 
 @given(TRANSFORM)
 def test_the_inverse_is_that_of_the_matrix(transform: Transform) -> None:
-    inverse = geometry.inverse(transform)
+    inverse = transforms.inverse(transform)
     assert matrix(inverse) == pytest.approx(np.linalg.inv(matrix(transform)), abs=1e-6)
-    both = geometry.compose(transform, inverse)
+    both = transforms.compose(transform, inverse)
     assert matrix(both) == pytest.approx(matrix(IDENTITY), abs=1e-6)
 
 
@@ -95,7 +95,7 @@ def angle_between(first: Quaternion, second: Quaternion) -> float:
 def test_rotations_have_constant_speed(first: Quaternion, second: Quaternion, ratio: float) -> None:
     whole = angle_between(first, second)
     assume(whole < math.pi - 0.01)  # otherwise two arcs are equally short
-    between = geometry.slerp(first, second, ratio)
+    between = transforms.slerp(first, second, ratio)
     assert math.hypot(*between) == pytest.approx(1.0)
     assert angle_between(first, between) == pytest.approx(ratio * whole, abs=1e-4)
     assert angle_between(between, second) == pytest.approx((1.0 - ratio) * whole, abs=1e-4)
@@ -103,15 +103,15 @@ def test_rotations_have_constant_speed(first: Quaternion, second: Quaternion, ra
 
 @given(TRANSFORM, TRANSFORM, RATIO)
 def test_translations_are_linear(first: Transform, second: Transform, ratio: float) -> None:
-    between = geometry.interpolate(first, second, ratio).translation
+    between = transforms.interpolate(first, second, ratio).translation
     ends = np.array(first.translation), np.array(second.translation)
     assert between == pytest.approx(ends[0] + (ends[1] - ends[0]) * ratio, abs=1e-9)
 
 
 def test_opposite_quaternions_are_the_same_rotation() -> None:
-    turn = geometry.quaternion_of_angles(0.1, 0.2, 0.3)
+    turn = transforms.quaternion_of_angles(0.1, 0.2, 0.3)
     opposite = Quaternion(*(-value for value in turn))
-    middle = geometry.slerp(turn, opposite, 0.5)
+    middle = transforms.slerp(turn, opposite, 0.5)
     assert angle_between(turn, middle) == pytest.approx(0.0, abs=1e-6)
 
 
@@ -126,4 +126,4 @@ def test_opposite_quaternions_are_the_same_rotation() -> None:
     ],
 )
 def test_unit_quaternions(rotation: Quaternion, expected: bool) -> None:
-    assert geometry.is_unit(rotation) is expected
+    assert transforms.is_unit(rotation) is expected

@@ -15,8 +15,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composer.bridges.importing.conditions import condition
 from composer.language.tree import plain
-from composer.launch.conditions import condition
 from composer.loading import load
 from composer.model.resolve import OverrideOptions
 from tests.examples import examples

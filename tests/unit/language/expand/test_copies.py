@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from composer.language.document.limits import MAX_COPIES
 from composer.language.expand import expand
+from composer.language.rules import MAX_COPIES
 from composer.language.tree import Plain, plain
 from tests.unit.support.checking import diagnostics_in, places
 from tests.unit.support.resolving import tree_of

@@ -7,8 +7,8 @@ import time
 import pytest
 
 from composer.base.diagnostics import Diagnostic
-from composer.language.document.limits import MAX_DEPTH
 from composer.language.expand import expand, missing_names
+from composer.language.rules import MAX_DEPTH
 from composer.language.tree import Entry, Mapping, Plain, Tree, plain
 from tests.unit.support.resolving import tree_of
 

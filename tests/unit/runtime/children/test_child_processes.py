@@ -23,7 +23,7 @@ from composer.runtime.children.child_processes import (
     Command,
     StartFailed,
 )
-from composer.runtime.executors.stacks import format_stack, stacks_of
+from composer.runtime.executors.tracebacks import format_stack, stacks_of
 from tests.unit.support.waiting import PATIENCE_S, is_alive, status_of, wait_until
 
 MARK = "COMPOSER_TEST_MARK"

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from composer.behavior import CallError
-from composer.runtime.executors.exceptions import (
+from composer.runtime.executors.tracebacks import (
     describe,
     is_closing,
     printable,
@@ -132,10 +132,10 @@ def test_a_report_has_the_frames_of_user_code(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(ValueError, match="no text") as caught:
         printable(Odd(no_text))
     assert 'test_exceptions.py", line' in report_of(caught.value)
-    assert "executors/exceptions.py" not in report_of(caught.value)
+    assert "executors/tracebacks.py" not in report_of(caught.value)
     assert report_of(ValueError("never raised")) == "ValueError: never raised"
     monkeypatch.setenv("COMPOSE_DEBUG", "1")
-    assert "executors/exceptions.py" in report_of(caught.value)
+    assert "executors/tracebacks.py" in report_of(caught.value)
 
 
 def test_closing_differs_from_a_generator_exit_of_user_code() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from composer.runtime.clock.clock import COMPUTER, RealClock
+from composer.runtime.clock import COMPUTER, RealClock
 from composer.runtime.metrics.figures import CountedRate, MessageRate
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 

@@ -10,13 +10,13 @@ from xml.etree import ElementTree
 import pytest
 
 from composer.runtime.middleware import dds_xml
-from composer.runtime.middleware.dds_profiles import (
+from composer.runtime.middleware.dds_xml import announce_less_often, segment_for_large_messages
+from composer.runtime.middleware.environment import (
     use_command_profile,
     use_discovery_profile,
     use_large_system_profile,
 )
-from composer.runtime.middleware.dds_xml import announce_less_often, segment_for_large_messages
-from composer.runtime.middleware.shared_memory import LARGE_SEGMENT_BYTES, MIN_FREE_BYTES
+from composer.runtime.middleware.local_resources import LARGE_SEGMENT_BYTES, MIN_FREE_BYTES
 
 TAG = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"

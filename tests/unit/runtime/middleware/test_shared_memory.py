@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from composer.runtime.middleware.dds_participants import count_participants, enlarge_receive_buffers
-from composer.runtime.middleware.shared_memory import (
+from composer.runtime.middleware.local_resources import (
+    count_participants,
+    enlarge_receive_buffers,
     remove_dead_segments,
     remove_incomplete_ports,
 )
