@@ -13,7 +13,7 @@ from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, SourceFile, Span, shown_path
 from composer.bridges.importing import FoundNode, FoundParameter, FoundPort
-from composer.bridges.importing.conditions import ALWAYS, Condition, conditions_of_calls
+from composer.bridges.importing.branches import ALWAYS, Condition, conditions_of_calls
 from composer.language.tree import Plain
 from composer.model import BehaviorReference, PortKind
 from composer.model.resolve.parameters import rclpy_type
