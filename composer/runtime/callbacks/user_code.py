@@ -1,6 +1,7 @@
-"""Runs the user code of a node on its loop: exceptions are faults, coroutines are tasks; queues.
+"""Runs the user code of a node on its loop: exceptions are faults, coroutines are tasks.
 
-The queue of a port handles one item at a time; if it is full, the oldest is dropped.
+What arrives at a port waits in a queue, which handles one item at a time. If it is full, the oldest
+item is dropped.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import dedent
 
@@ -107,15 +108,17 @@ class Faulty(Behavior):
 '''
 
 
-def write_faulty_system(folder: Path) -> Path:
-    """Write the system and its behavior; return the path of the system."""
-    executors = ", ".join(f"{name}: {{kind: events}}" for name in HANGING)
-    nodes = [NODE.replace("NAME", name).replace("    EXECUTOR\n", "") for name in FAULTS]
-    nodes += [
-        NODE.replace("NAME", name).replace("EXECUTOR", f"executor: {name}") for name in HANGING
-    ]
+def write_faulty_system(folder: Path, names: Sequence[str] = (*FAULTS, *HANGING)) -> Path:
+    """Write a system with nodes of these names, and their behavior; return its path."""
+    executors = "".join(f", {name}: {{kind: events}}" for name in names if name in HANGING)
+    nodes = (
+        NODE.replace("NAME", name).replace("EXECUTOR", f"executor: {name}")
+        if name in HANGING
+        else NODE.replace("NAME", name).replace("    EXECUTOR\n", "")
+        for name in names
+    )
     path = folder / "faulty.yaml"
-    text = METRONOME.replace("events}}", f"events}}, {executors}}}")
+    text = METRONOME.replace("events}}", f"events}}{executors}}}")
     path.write_text(text + "".join(nodes), encoding="utf-8")
     path.with_suffix(".py").write_text(dedent(MODULE), encoding="utf-8")
     return path
