@@ -119,7 +119,7 @@ def settled(measure: Callable[[], Usage], expected: Usage) -> Usage:
 @pytest.mark.parametrize(
     "restarts",
     [
-        pytest.param(2, marks=pytest.mark.slow),
+        pytest.param(1, marks=pytest.mark.slow),
         pytest.param(200, marks=[pytest.mark.soak, pytest.mark.timeout(3600)]),
     ],
 )
@@ -145,10 +145,14 @@ def test_restarts(restarts: int, peer: Peer, tmp_path: Path) -> None:
             os.kill(process_of("second", pid), signal.SIGKILL)
             system.wait_for(rf"/other is up again after restart {number}\b")
 
-        restart_all(1)  # the first time loads what stays
-        first = usage(pid)
+        firsts = []
+        for number in (1, 2):  # the first time loads what stays
+            restart_all(number)
+            firsts.append(usage(pid))
+        # Just after a restart, a process may not have opened everything again.
+        first = max(firsts, key=lambda item: (item.processes, item.descriptors))
         for number in range(restarts):
-            restart_all(number + 2)
+            restart_all(number + 3)
             if number % 20 == 0:
                 print(number, usage(pid))
         last = settled(lambda: usage(pid), first)

@@ -286,8 +286,8 @@ class Peer(ServiceUser):
 
     def close(self) -> None:
         self._executor.shutdown()
+        self._thread.join(PATIENCE_S)  # a wait set needs the context
         self.context.try_shutdown()
-        self._thread.join(PATIENCE_S)
         # Each: a lifecycle node would keep the participant, and so all services, in the ROS graph.
         for node in (*self._joined, self.node):
             leave(node)
