@@ -1,6 +1,6 @@
-"""Characters that control a terminal, change the direction of text, or are invisible.
+"""Text for a terminal: its width, numbers with their nouns, lists of names, and unsafe characters.
 
-And the width of text in a terminal, numbers with their nouns, and lists of names.
+Unsafe are characters that control a terminal, change the direction of text, or are invisible.
 """
 
 from __future__ import annotations

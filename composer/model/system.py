@@ -1,6 +1,6 @@
-"""The system: nodes, connections, chains and executors; and the part of one process.
+"""The system: nodes, connections, chains, executors, and what it records of itself.
 
-And what a system records of itself.
+A process of a system has a part of it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Plans: steps in phases, each with its cause and the steps that it waits for; how they are made.
+"""Plans and how they are made: bring-up, tear-down, and from any states of nodes to others.
 
-They lead from any states of nodes to others: bring-up, tear-down, new goals.
+A plan has steps in phases, each with its cause and the steps that it waits for.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""Reads topics as bytes: for channels that show messages, and to measure rates and sizes.
+"""The topics of the ROS graph: their messages as bytes, and the nodes that they connect.
 
-Of large messages, and of topics with many bytes per second, only some messages are read.
+Messages are read for channels that show them, and to measure rates and sizes. Of large messages,
+and of topics with many bytes per second, only some are read.
 
 The topology has the nodes of the ROS graph with their endpoints, and what the views ask about them.
 """

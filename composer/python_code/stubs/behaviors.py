@@ -1,9 +1,11 @@
-"""Stubs of node types: for each, the base class of its behavior with its ports and handlers.
+"""Stubs of node types, and of message, service and action packages.
 
-And of message, service and action packages. Fields are properties, as in the classes of ROS. A
-field accepts more than it returns: a list of numbers may be assigned where an ``array.array`` is
-read. A float field refuses ints, as ROS sends garbage for them (``Float64(data=3)`` arrives as
-5e-324). The types that packages share are in ``libraries/_ros.pyi``.
+The stub of a node type is the base class of its behavior, with its ports and handlers.
+
+Fields of messages are properties, as in the classes of ROS. A field accepts more than it returns: a
+list of numbers may be assigned where an ``array.array`` is read. A float field refuses ints, as ROS
+sends garbage for them (``Float64(data=3)`` arrives as 5e-324). The types that packages share are in
+``libraries/_ros.pyi``.
 """
 
 from __future__ import annotations

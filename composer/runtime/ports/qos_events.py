@@ -146,7 +146,7 @@ class QosEvents:
     it measures a deadline or a lease from the last message, even if that was sent before the node
     was deactivated. So an event also counts only if the node was active for the whole period.
 
-    In virtual time, the middleware is not asked: ``topic`` monitors deadlines and leases.
+    In virtual time the middleware is not asked: ``intra_process.topic`` has deadlines and leases.
     """
 
     #: Whether it watches matches, so that in-process delivery cannot.

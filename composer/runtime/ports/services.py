@@ -1,4 +1,7 @@
-"""The service and client ports; limits and reactions, as of action clients too."""
+"""Services, their clients, and what these have in common with action clients.
+
+Clients of both kinds limit how long they wait, and send requests or goals for reactions.
+"""
 
 from __future__ import annotations
 
