@@ -84,7 +84,7 @@ def test_tasks_of_an_executor_block_as_callbacks_do(
 ) -> None:
     monkeypatch.setattr(health_monitor, "BLOCKS_AFTER_S", 0.1)
     text = f'system: working\nnodes: {{tasks: {{class: "{CLASSES}:Tasks"}}}}'
-    options = HostOptions(stop_within_s=2.0)  # on_done blocks until it is interrupted
+    options = HostOptions(stop_within_s=5.0)  # on_done blocks until it is interrupted
     with running(text, tmp_path, options=options) as system:
         call = peer.begin(Trigger, "/wait")
         for name in ("plain", "awaits"):
