@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.pipeline import cpu_s
 from tests.ros.dashboard.test_foxglove_limits import raw
 from tests.ros.support.commands import COMPOSE, hand_written
 from tests.ros.support.dashboard import Address
@@ -149,6 +150,9 @@ def test_a_regular_expression_that_never_ends(tmp_path: Path, signals: int, grac
     path.with_name("parser.py").write_text(PARSER, encoding="utf-8")
     with RunningSystem(str(path), "--grace", grace) as system:
         wait_until(path.with_name("parsing").exists)  # a line of the log would wait for the lock
+        # Its thread may have to wait for the lock once more, before the expression.
+        began_s = cpu_s(system.process.pid)
+        wait_until(lambda: cpu_s(system.process.pid) > began_s + 0.3, "the expression")
         for _ in range(signals):
             system.process.send_signal(signal.SIGINT)
             wait_until_delivered(system.process.pid, signal.SIGINT)
