@@ -48,6 +48,7 @@ def test_any_bytes(data: bytes) -> None:
 
 @examples(500)
 @given(st.lists(PIECES, max_size=30).map("".join))
+@example("%YAML 1.1\n\t")
 def test_any_text(text: str) -> None:
     source = SourceFile("f", text)
     tree, diagnostics = parse_document(source)

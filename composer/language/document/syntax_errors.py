@@ -56,7 +56,10 @@ class _Problem:
 
     def at_error(self, message: str, hint: str | None = None, *related: Label) -> Diagnostic:
         """Return a diagnostic where the parser stopped."""
-        return Diagnostic(YAML_SYNTAX, message, span_at(self.source, self.place), related, hint)
+        place, lines = span_at(self.source, self.place), self.source.lines
+        if place.line > len(lines):  # the end, for libyaml, of a file without a last line break
+            place = Span(self.source, len(lines), len(lines[-1]) + 1)
+        return Diagnostic(YAML_SYNTAX, message, place, related, hint)
 
     def at_context(self, message: str, hint: str | None = None) -> Diagnostic:
         """Return a diagnostic at the start of the context."""
