@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
@@ -17,6 +17,7 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -61,6 +62,8 @@ _GOALS = {
 E = TypeVar("E", bound=Event)
 T = TypeVar("T")
 N = TypeVar("N", bound=Node)
+#: What a spin may raise while its executor and context are shut down.
+_DESTROYED = (rclpy_implementation.RCLError, rclpy_implementation.InvalidHandle)
 
 
 def wait_until(condition: Callable[[], T | None], what: str = "", limit_s: float = PATIENCE_S) -> T:
@@ -276,6 +279,7 @@ class Peer(ServiceUser):
         self.context.init([])
         super().__init__(Node(f"peer_{os.getpid()}", context=self.context))
         self._joined: list[Node] = []
+        self._is_closing = False
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
@@ -285,8 +289,9 @@ class Peer(ServiceUser):
         return wait_until(condition, what)
 
     def close(self) -> None:
+        self._is_closing = True
         self._executor.shutdown()
-        self._thread.join(PATIENCE_S)  # a wait set needs the context
+        self._thread.join(PATIENCE_S)
         self.context.try_shutdown()
         # Each: a lifecycle node would keep the participant, and so all services, in the ROS graph.
         for node in (*self._joined, self.node):
@@ -341,8 +346,11 @@ class Peer(ServiceUser):
         return str(result.reason)
 
     def _spin(self) -> None:
-        with suppress(ExternalShutdownException):
+        try:
             self._executor.spin()
+        except (ExternalShutdownException, *_DESTROYED):
+            if not self._is_closing:
+                raise
 
 
 def finished(future: Any) -> Any:
