@@ -1,4 +1,4 @@
-"""Folders: those of the package, those of ROS, and which users a search may trust.
+"""The folders of the package and of ROS, and the users whose files a search may trust.
 
 Data files are JSON Schemas, node types, systems, interfaces and pages of rules. A wheel has them in
 ``composer/share/`` (see pyproject.toml). In a checkout or an editable install, they are next to the

@@ -125,7 +125,7 @@ class LimitedDiagnostics(list[Diagnostic]):
         super().__delitem__(index)
         self._errors = sum(item.severity is Severity.ERROR for item in self)
 
-    def __iadd__(self, items: Iterable[Diagnostic]) -> Self:  # type: ignore[misc,override]
+    def __iadd__(self, items: Iterable[Diagnostic]) -> Self:  # type: ignore[misc,override]  # adds nothing else
         for item in items:
             self.append(item)
         return self

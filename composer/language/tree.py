@@ -1,7 +1,7 @@
 """The located tree: the content of a YAML file, with the location of every key and value.
 
-Functions read typed values from it, and change values in it, skipping those of the wrong type. The
-schema has already reported those.
+Functions read typed values from it, and change values in it. They skip values of the wrong type,
+which the schema has already reported.
 """
 
 from __future__ import annotations

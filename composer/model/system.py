@@ -29,7 +29,7 @@ from composer.model.ports import ChannelKind, Delivery, Isolation, Port, Qos
 #: The end of the topic with the requests and responses of a service: ROS 2's introspection.
 EVENT_TOPIC = "_service_event"
 T = TypeVar("T")
-#: The executor of nodes without one; it need not be declared.
+#: The executor of nodes without one; declaring it is optional.
 DEFAULT_EXECUTOR = "default"
 
 

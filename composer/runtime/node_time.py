@@ -1,7 +1,7 @@
 """The time of a node (system, steady, or simulated from /clock), and calls scheduled by it.
 
-In simulated time (parameter ``use_sim_time``) that is the time of /clock. Otherwise the time is
-that of the system clock, and calls are scheduled by the steady clock, which nothing adjusts.
+With the parameter ``use_sim_time``, the time is read from /clock. Otherwise it is read from the
+system clock, and calls are scheduled by the steady clock, which nothing adjusts.
 
 In rclpy each node that uses simulated time has its own subscription: an endpoint per node, and the
 same message taken as often as there are nodes. Here one subscription serves all of them.

@@ -283,7 +283,7 @@ _VERBS = {
 
 
 def _add_verb(name: str, verb: _Verb) -> None:
-    """Add a command to ``compose lifecycle``, below those of ros2."""
+    """Add a command to ``compose lifecycle``, below the commands of ros2."""
 
     def change(system: RunningSystem, timeout: Timeout = CHANGE_TIMEOUT_S) -> None:
         _change_system(name, system, timeout, verb.failure)

@@ -214,9 +214,9 @@ def current_domain() -> str:
 def find_runs(logs: Path, system: str | None = None) -> list[Run]:
     """Return the runs below ``logs`` in the order of their start.
 
-    ``system`` selects those of the systems with that full name or last part; by default, all but
-    those of processes that are parts of systems. If there are only parts of a system, as on a
-    computer that runs no other of its processes, they are returned.
+    ``system`` selects the runs of systems with that full name or last part. By default, all runs
+    are returned, except runs of processes that are parts of systems. If there are only parts of a
+    system, as on a computer that runs no other of its processes, they are returned.
     """
     runs: list[Run] = []
     parts: list[Run] = []

@@ -279,7 +279,7 @@ def _message(name: str, message: Message) -> Iterator[str]:
     for constant in message.constants:
         value = constant.value
         if constant.type.name == "byte" and isinstance(value, int):
-            value = bytes([value])  # type: ignore[assignment]
+            value = bytes([value])  # type: ignore[assignment]  # as in the class
         yield f"    {constant.name}: Final = {value!r}"
     fields = [item for item in message.fields if not keyword.iskeyword(item.name)]
     arguments = "".join(f", {item.name}: {_accepted(item.type)} = ..." for item in fields)

@@ -192,7 +192,7 @@ class _NameTypes(dict[str, ValueType]):
         return ANYTHING
 
     def __contains__(self, name: object) -> bool:
-        # A name with dots is that of a parameter, not a field of a shorter name.
+        # A name with dots is the name of a parameter, not a field of a shorter name.
         return super().__contains__(name) or "." not in str(name)
 
     def get(self, name: str, _default: Any = None) -> Any:

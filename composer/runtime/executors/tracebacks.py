@@ -35,7 +35,7 @@ _COMPOSER = f"{Path(__file__).parents[2]}{os.sep}"
 _SHARE = f"{_COMPOSER}share{os.sep}"
 _IMPORT_SYSTEM = "<frozen importlib"
 #: Where Python's own modules are, and packages that were installed.
-_LIBRARIES = (os.path.dirname(os.__file__), *site.getsitepackages())  # noqa: PTH120
+_LIBRARIES = (os.path.dirname(os.__file__), *site.getsitepackages())  # noqa: PTH120 - as in code objects
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -124,7 +124,7 @@ def format_stacks(threads: Iterable[int]) -> str:
 def user_frames(stack: Sequence[FrameType]) -> Sequence[FrameType]:
     """Return the frames of a stack that belong to user code; all of them if none does."""
     internal = [is_internal(frame.f_code.co_filename) for frame in stack]
-    # The outermost frames are those of the thread.
+    # The outermost frames belong to the thread.
     depth = len(internal) - internal[::-1].index(True) - 1 if True in internal else 0
     return [
         frame for frame, skip in zip(stack[:depth], internal, strict=False) if not skip

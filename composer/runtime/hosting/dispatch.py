@@ -232,7 +232,8 @@ def _install_context() -> None:
 
         return shut_down
 
-    rclpy.ok = ok  # type: ignore[attr-defined]
     rclpy.init = init_context
     rclpy.shutdown = finishing(rclpy.shutdown, "shutdown")
+    # rclpy imports these two without declaring them as its own.
+    rclpy.ok = ok  # type: ignore[attr-defined]
     rclpy.try_shutdown = finishing(utilities.try_shutdown, "try_shutdown")  # type: ignore[attr-defined]

@@ -52,9 +52,9 @@ TEST_NODE = "_compose_trial"
 class Matching:
     """The current generation of matches, which is replaced whenever a match changes.
 
-    A publisher that has counted its matches in this ``generation`` need not count again. One flag
-    and one generation serve all publishers: they stay in the cache, while an object per publisher
-    would be fetched from memory for each message.
+    A publisher counts its matches once in each ``generation``. One flag and one generation serve
+    all publishers: they stay in the cache, while an object per publisher would be fetched from
+    memory for each message.
     """
 
     __slots__ = ("generation", "is_supported")

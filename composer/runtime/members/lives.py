@@ -52,7 +52,7 @@ class ProcessUnavailable(Exception):
 class MemberContext:
     """What a process of the system needs from the one that coordinates it.
 
-    ``namespace`` is that of the coordinating manager; ``command`` starts ``compose run`` with the
+    ``namespace`` is where the coordinating manager is; ``command`` starts ``compose run`` with the
     same system, and is empty if the process is only to be awaited. What nodes report within the
     context manager ``together`` is handled together.
     """
@@ -72,7 +72,7 @@ class MemberContext:
     def command_of(self, process: Process, report_key: str) -> Command:
         """Return the command that starts a process, which signs its reports with the key."""
         words = (*self.command, "--process", process.name.value)
-        # Its lines are parsed, whatever format those of this process have.
+        # Its lines are parsed, whatever format the lines of this process have.
         usual = {"PYTHONUNBUFFERED": "1", "RCUTILS_CONSOLE_OUTPUT_FORMAT": CONSOLE_FORMAT}
         usual |= own_enclave(os.environ, self.full_name(process))
         environment = {name.value: value for name, value in process.environment}

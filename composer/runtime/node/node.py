@@ -238,7 +238,7 @@ P = TypeVar("P", bound=RunningPort)
 class NodeEntities(PortSet):
     """The ports and timers of a configured node, and its reactions to transitions.
 
-    Those that send come first, then those that receive, timers, those of libraries.
+    Ports that send come first, then ports that receive, timers, and the ports of libraries.
     ``always_on_context`` is for ports and timers that are always on; only its gate differs.
     """
 

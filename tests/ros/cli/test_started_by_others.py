@@ -37,7 +37,7 @@ nodes:
 class Service:
     """A service: its process, and what it reports to its service manager.
 
-    It has the variables of its unit, and those that systemd sets; not those of a shell.
+    It has the variables of its unit and what systemd sets, not the variables of a shell.
     """
 
     def __init__(self, unit: Path, folder: Path) -> None:

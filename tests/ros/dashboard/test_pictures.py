@@ -1,4 +1,4 @@
-"""The files of the page, and the pictures of the guide, which are those of the real page."""
+"""The files of the page, and the pictures of the guide, which show the real page."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ SPAN = Span(SourceFile("system.yaml", ""), 1, 1, 1)
 
 
 def reference(name: str, *folders: Path) -> BehaviorReference:
-    """Return a reference to a class in the first folder, or in those of node types."""
+    """Return a reference to a class in the first folder, or in the folders of node types."""
     return BehaviorReference(Located(name, SPAN), folders[0], folders[1:])
 
 

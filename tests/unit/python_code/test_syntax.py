@@ -1,4 +1,4 @@
-"""Syntax trees: texts that cannot be parsed, and walks, compared with those of ``ast``."""
+"""Syntax trees: texts that cannot be parsed, and walks, compared with ``ast``."""
 
 from __future__ import annotations
 

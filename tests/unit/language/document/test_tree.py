@@ -132,7 +132,7 @@ def test_source_keeps_the_text_without_a_byte_order_mark() -> None:
 #: Texts, also those which YAML 1.1 reads as truth values, sexagesimals, octals or dates.
 TEXTS = ("nULL", "tRUE", "NO", "on", "y", "22:22", "1_000", "0b11", "2024-13-01", "0o18", "-0x1F")
 TEXTS += (".", "--", "1.2.3", "1e", "e3", "inf", "nan", "=", "<<")
-TEXTS += ("١٢",)  # digits, but not those of YAML
+TEXTS += ("١٢",)  # digits, but not the digits of YAML
 
 
 @pytest.mark.parametrize(
