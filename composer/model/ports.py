@@ -237,6 +237,10 @@ class FeedbackSteps:
     span: Span = field(compare=False)
 
 
+#: Default timeout of clients for the server and its response.
+CALL_TIMEOUT_MS = 5000.0
+
+
 @dataclass(frozen=True, slots=True)
 class Port:
     """An endpoint of a topic, service or action in a node of a system."""
@@ -269,6 +273,11 @@ class Port:
     def reaction(self, event: Event) -> Reaction | None:
         """Return the reaction to ``event``, or None."""
         return dict(self.reactions).get(event)
+
+    @property
+    def call_timeout_ms(self) -> float:
+        """How long a client waits for its server, and then for the first response."""
+        return CALL_TIMEOUT_MS if self.timeout_ms is None else self.timeout_ms.value
 
 
 class TimerClock(StrEnum):

@@ -12,7 +12,7 @@ from composer.behavior import CallCancelled, CallTimeout, ServerUnavailable
 from composer.model import Port
 from composer.model.qos import Durability
 from composer.runtime.executors.futures import Future, wrap_future
-from composer.runtime.ports import DEFAULT_TIMEOUT_MS, RunningPort
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.goals import GoalOutcome
 from composer.runtime.ports.serving import RequestServer
 from composer.testing.behavior_context import TestContext
@@ -109,8 +109,7 @@ class ClientPort(RunningPort):
         self._name = port.name.value
         self._what = f"{port.kind.channel} '{port.full_name}'"
         self._label = f"{port.kind} '{self._name}'"
-        limit = port.timeout_ms
-        self._timeout_ms = DEFAULT_TIMEOUT_MS if limit is None else limit.value
+        self._timeout_ms = port.call_timeout_ms
         self._result_timeout_ms = inf if (most := port.result_timeout_ms) is None else most.value
         self.service_type = self.action_type = interface
         self._server: Future[Any] = Future()

@@ -43,6 +43,7 @@ from composer.model import (
     Timer,
     TimerClock,
 )
+from composer.model.ports import CALL_TIMEOUT_MS
 from composer.model.resolve.qos import QosTable, implicit_qos
 
 RULE = error("RC440", "invalid-expression")
@@ -137,9 +138,6 @@ def _log(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Template | N
     return template(tree.get("message"), diagnostics), level
 
 
-#: Default timeout of clients for the server and its response.
-DEFAULT_TIMEOUT_MS = 5000.0
-
 _SECTIONS = tuple((kind, kind.section) for kind in PortKind)
 _CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
 _INLINE_EVENTS = {
@@ -228,7 +226,7 @@ def _settings(tree: Mapping) -> dict[str, Any]:
 def _timeout(kind: PortKind, tree: Mapping, span: Span) -> Located[float] | None:
     timeout_ms = number(tree.get("timeout_ms"))
     if timeout_ms is None and kind in _CLIENTS:
-        return Located(DEFAULT_TIMEOUT_MS, span)
+        return Located(CALL_TIMEOUT_MS, span)
     return timeout_ms
 
 

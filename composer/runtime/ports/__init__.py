@@ -6,9 +6,6 @@ from collections.abc import Iterable, Iterator
 
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 
-#: The time limit of a call unless YAML sets one.
-DEFAULT_TIMEOUT_MS = 5000.0
-
 
 class RunningPort:
     """A port or timer between the configuration and the cleanup of its node."""

@@ -23,7 +23,7 @@ from composer.runtime.executors.tasks import sleep
 from composer.runtime.executors.tracebacks import text_of
 from composer.runtime.intra_process.servers import LocalService
 from composer.runtime.intra_process.taps import CallTap
-from composer.runtime.ports import DEFAULT_TIMEOUT_MS, RunningPort
+from composer.runtime.ports import RunningPort
 from composer.runtime.ports.serving import Handler, RequestServer
 from composer.runtime.ros.conversions import rclpy_profile
 from composer.runtime.ros.messages import interface_class
@@ -153,7 +153,7 @@ class CallingPort(RunningPort):
         self._name = port.name.value
         self._label = f"{port.kind} '{self._name}'"
         self._what = f"{what} '{port.full_name}'"
-        self._timeout_ms = DEFAULT_TIMEOUT_MS if port.timeout_ms is None else port.timeout_ms.value
+        self._timeout_ms = port.call_timeout_ms
         self._reactions: dict[Event, RunningReaction] = {}
         statistics = context.statistics.callback(port.kind.value, self._name)
         self._timer = CallbackTimer(context, statistics, port.budget_ms)
