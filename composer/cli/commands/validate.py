@@ -192,10 +192,9 @@ def _explain(text: str) -> None:
 
 def _listed(paths: Sequence[Path]) -> str:
     """Return the first paths, and how many more there are."""
-    from composer.base.characters import visible
+    from composer.base.characters import shortened, visible
 
-    named = ", ".join(visible(str(path)) for path in paths[:_MAX_LISTED])
-    return named if len(paths) <= _MAX_LISTED else f"{named} and {len(paths) - _MAX_LISTED} more"
+    return shortened([visible(str(path)) for path in paths], _MAX_LISTED)
 
 
 def _selected(

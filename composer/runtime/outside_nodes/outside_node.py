@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Set
 
 from rclpy.node import Node as RosNode
 
-from composer.base.characters import listed
+from composer.base.characters import shortened
 from composer.base.fast_dataclass import dataclass
 from composer.model import External, LogLevel, Node, Outside
 from composer.model.lifecycle import (
@@ -233,7 +233,7 @@ class ObservedNode(OutsideNode):
         names = [f"{port.kind} {port.full_name}" for port in self._presence.missing(self.earlier)]
         if not names:
             return "it is not in the ROS graph"
-        return f"it has no {listed(names, _MAX_MISSING)}"
+        return f"it has no {shortened(names, _MAX_MISSING)}"
 
     @property
     def _service(self) -> str:

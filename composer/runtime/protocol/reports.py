@@ -6,7 +6,7 @@ import hmac
 from collections.abc import Mapping
 from dataclasses import field
 
-from composer.base.characters import listed
+from composer.base.characters import shortened
 from composer.base.fast_dataclass import dataclass
 from composer.plan import STARTING, Condition
 
@@ -206,7 +206,7 @@ class SystemReport:
         missing = (Condition.ABSENT, STARTING)
         absent = [node.node for node in self.nodes if node.condition in missing]
         down = [node for node in self.nodes if node.held_down and node.node not in absent]
-        waiting = [f"waiting for {listed(absent, _MAX_LISTED)}"] if absent else []
+        waiting = [f"waiting for {shortened(absent, _MAX_LISTED)}"] if absent else []
         failed = [
             f"{node.node} is {node.condition or 'down'}" + f": {node.held_down}" * reasons
             for node in down

@@ -24,7 +24,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from composer.base.characters import listed
+from composer.base.characters import shortened
 from composer.model import ChannelKind, PortKind
 from composer.model.names import join_node_name
 from composer.runtime.middleware.local_resources import ended_participants
@@ -81,7 +81,7 @@ class Skipped:
     def warnings(self) -> tuple[str, ...]:
         """Return a warning for each reason."""
         return tuple(
-            f"skipped {listed(list(found), _MAX_LISTED)}: {why}"
+            f"skipped {shortened(list(found), _MAX_LISTED)}: {why}"
             for why, found in self._found.items()
         )
 

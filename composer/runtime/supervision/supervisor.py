@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
-from composer.base.characters import listed
+from composer.base.characters import shortened
 from composer.model import PrimaryState
 from composer.plan import (
     Condition,
@@ -214,7 +214,7 @@ class Supervisor:
 
     def _on_moved(self, moved: Sequence[NodeMoved]) -> None:
         causes = tuple(dict.fromkeys(item.cause for item in moved if item.cause))
-        self.reconciler.reconcile_settled(listed(causes, _MAX_CAUSES))
+        self.reconciler.reconcile_settled(shortened(causes, _MAX_CAUSES))
 
     def restart(self, restarts: Iterable[Restart]) -> None:
         """Restart failed nodes together, unless requested transitions come first."""
