@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field
 from itertools import islice
 
-from composer.base.diagnostics import Diagnostic, Label, shown, suggestion
+from composer.base.diagnostics import Diagnostic, Label, line_subject, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language import rules
@@ -16,6 +16,7 @@ from composer.language.schema.hints import (
     advice,
     expected,
     intended_key,
+    other_section,
     type_hint,
     value_advice,
 )
@@ -190,18 +191,20 @@ def _unknown_keys(error: _LocatedError, misspelled: _MisspelledKeys) -> Iterator
     if _has_other_ends(error):
         yield _other_ends(error, entries)
         return
-    valid = error.schema["properties"]
+    valid, title = error.schema["properties"], error.schema.get("title", "")
     unused = [key for key in valid if key not in error.instance]
     for name in error.unknown:
         if error.path in misspelled.deciding and _intended_key(error, name) not in _DECIDING:
             continue
         message = f"'{shown(name)}' is not a key of {error.owner}"
-        hint = advice(name, error.schema.get("title", ""), unused)
+        hint = advice(name, title, unused)
         meant = _intended_key(error, name)
         needed = misspelled.missing.get(error.path)
         if needed is not None and f"'{needed}'" not in str(hint):
             hint = f"it needs the key '{needed}'"
         subjects = () if meant is None else (("key", meant),)
+        if other_section(name, title) is not None:  # what follows is about a port of the wrong kind
+            subjects = (line_subject(error.owner_span),)
         span = entries[name].key.span
         yield Diagnostic(rules.UNKNOWN_KEY, message, span, hint=hint, subjects=subjects)
 

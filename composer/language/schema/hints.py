@@ -72,6 +72,22 @@ _ADVICE: dict[tuple[str, str], str] = {
     ("service", "when"): "remove it; every request gets a response",
 }
 
+#: Keys of the other end of a service or an action, by the title of the schema and the key: the
+#: section that was probably meant.
+_OTHER_SECTION: dict[tuple[str, str], str] = {
+    (owner, key): section
+    for owner, section, keys in (
+        ("service", "clients", ("timeout_ms", "on_response", "on_failure")),
+        ("client", "services", ("respond",)),
+        (
+            "action server",
+            "action_clients",
+            ("timeout_ms", "result_timeout_ms", "on_feedback", "on_result", "on_failure"),
+        ),
+        ("action client", "action_servers", ("accept", "feedback", "result")),
+    )
+    for key in keys
+}
 
 #: Example values for missing keys, by the title of the schema.
 EXAMPLES = {
@@ -103,11 +119,19 @@ def _intended_key(name: str, keys: frozenset[str]) -> str | None:
     return known or nearest(name, keys)
 
 
+def other_section(name: str, owner: str) -> str | None:
+    """Return the section whose ports have the key ``name``: the title ``owner`` lacks it."""
+    return _OTHER_SECTION.get((owner, name))
+
+
 def advice(name: str, owner: str, valid: Iterable[str]) -> str | None:
     """Return the hint for the unknown key ``name`` in a map with the title ``owner``."""
     keys = set(valid)
     if (owner, name) in _ADVICE:
         return _ADVICE[owner, name]
+    section = other_section(name, owner)
+    if section is not None:
+        return f"ports under '{section}' have this key: declare this one there"
     key = intended_key(name, keys)
     return f"did you mean '{key}'?" if key is not None else suggestion(name, keys, limit=12)
 
