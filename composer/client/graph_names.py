@@ -15,6 +15,7 @@ from composer.runtime.protocol.requests import NameAndTypes, visible_names
 from composer.runtime.ros.endpoints import details
 
 T = TypeVar("T")
+_MAX_LISTED = 8
 
 
 class GraphNames:
@@ -87,9 +88,6 @@ def type_mismatch_hint(session: Session, kind: str, name: str, type_name: str) -
     known = dict(session.graph.names(kind)).get(name, ())
     others = [other for other in known if other != type_name]
     return f"other nodes use type {', '.join(others)}, not {type_name}" if others else None
-
-
-_MAX_LISTED = 8
 
 
 class NotFoundError(RosError):

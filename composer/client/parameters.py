@@ -42,6 +42,7 @@ _GET, _SET = "get_logger_levels", "set_logger_levels"
 _GET_TYPE = "rcl_interfaces/srv/GetLoggerLevels"
 #: Of a logger whose level was never set: the level of its process applies.
 UNSET = "unset"
+_LEVELS = {severity: level.value for level, severity in SEVERITIES.items()}
 
 
 class UnknownParameterError(RosError):
@@ -240,9 +241,6 @@ def _settings_of(item: ParameterDescription) -> dict[str, Plain]:
     if "unknown" not in item.type and item.type != "not set":
         settings["type"] = item.type
     return {key: value for key, value in settings.items() if value is not None}
-
-
-_LEVELS = {severity: level.value for level, severity in SEVERITIES.items()}
 
 
 class LevelRejectedError(RosError):

@@ -24,6 +24,8 @@ _ALIGNED_S = 1.0
 _REPORT_GAP_S = 0.2
 #: A feed of reports waits this many periods for the next report.
 _REPORT_PERIODS = 1.5
+#: Takes the updates of a feed, on any thread.
+Receiver = Callable[[Update], None]
 
 
 class Feed(ABC):
@@ -75,10 +77,6 @@ class RunningFeed:
     def next_s(self) -> float:
         """When the feed is to be polled (seconds, time.monotonic)."""
         return 0.0 if self.is_urgent else self.due_s
-
-
-#: Takes the updates of a feed, on any thread.
-Receiver = Callable[[Update], None]
 
 
 class Feeds:

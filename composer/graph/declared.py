@@ -32,6 +32,22 @@ from composer.plan.drift.compare import states_after_bring_up
 from composer.rules.analysis.context import location
 from composer.rules.analysis.frames import kind_of, topic_of
 
+#: The kinds of nodes that are noted on them.
+_NOTED = (
+    ImplementationKind.CLASS,
+    ImplementationKind.EXECUTABLE,
+    ImplementationKind.COMPONENT,
+    ImplementationKind.EXTERNAL,
+)
+#: The groups of nodes that no executor runs.
+_PROCESS = "process "
+_CONTAINER = "container "
+_OUTSIDE = {
+    ImplementationKind.EXECUTABLE: "child processes",
+    ImplementationKind.COMPONENT: "components",
+    ImplementationKind.EXTERNAL: "external nodes",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class _BroughtUp:
@@ -197,23 +213,6 @@ def _containers(system: System) -> frozenset[str]:
         for node in system.nodes
         if node.container is not None and system.node(node.container.value) is not None
     )
-
-
-#: The kinds of nodes that are noted on them.
-_NOTED = (
-    ImplementationKind.CLASS,
-    ImplementationKind.EXECUTABLE,
-    ImplementationKind.COMPONENT,
-    ImplementationKind.EXTERNAL,
-)
-#: The groups of nodes that no executor runs.
-_PROCESS = "process "
-_CONTAINER = "container "
-_OUTSIDE = {
-    ImplementationKind.EXECUTABLE: "child processes",
-    ImplementationKind.COMPONENT: "components",
-    ImplementationKind.EXTERNAL: "external nodes",
-}
 
 
 def _executor_key(system: System, executor: str) -> str:

@@ -31,6 +31,31 @@ _NAME = re.compile(r"[a-z][a-z0-9_]{0,200}", re.ASCII)  # a file name
 _PACKAGE_NAME = re.compile(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", re.ASCII)
 #: Folders without sources, made by colcon, Python and JavaScript tools.
 _SKIPPED = frozenset(("build", "install", "log", "node_modules", "site-packages", "__pycache__"))
+#: type_description_interfaces/msg/FieldType, numbers 1 to 22; arrays add 48, 96 or 144 to them.
+_TYPE_NAMES: Mapping[int, str] = {
+    2: "int8",
+    3: "uint8",
+    4: "int16",
+    5: "uint16",
+    6: "int32",
+    7: "uint32",
+    8: "int64",
+    9: "uint64",
+    10: "float32",
+    11: "float64",
+    13: "uint8",
+    15: "bool",
+    16: "byte",
+    17: "string",
+    18: "wstring",
+    21: "string",
+    22: "wstring",
+}
+_NESTED = 1
+_FIXED_ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 1, 2, 3
+_ROW = 48
+#: The field that rosidl adds to empty messages, because C has no empty struct.
+_PLACEHOLDER = "structure_needs_at_least_one_member"
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,33 +252,6 @@ def _snapshot() -> Mapping[str, str]:
     text = Path(__file__).with_name("jazzy.json").read_text(encoding="utf-8")
     definitions: Mapping[str, str] = json.loads(text)
     return definitions
-
-
-#: type_description_interfaces/msg/FieldType, numbers 1 to 22; arrays add 48, 96 or 144 to them.
-_TYPE_NAMES: Mapping[int, str] = {
-    2: "int8",
-    3: "uint8",
-    4: "int16",
-    5: "uint16",
-    6: "int32",
-    7: "uint32",
-    8: "int64",
-    9: "uint64",
-    10: "float32",
-    11: "float64",
-    13: "uint8",
-    15: "bool",
-    16: "byte",
-    17: "string",
-    18: "wstring",
-    21: "string",
-    22: "wstring",
-}
-_NESTED = 1
-_FIXED_ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 1, 2, 3
-_ROW = 48
-#: The field that rosidl adds to empty messages, because C has no empty struct.
-_PLACEHOLDER = "structure_needs_at_least_one_member"
 
 
 def read_description(name: str, text: str) -> Interface:

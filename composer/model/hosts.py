@@ -21,6 +21,14 @@ _USER = re.compile(r"\w[\w.+-]*")
 
 #: ROS reads from it in which enclave a process is.
 ENCLAVE_VARIABLE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+DEFAULT_SERVER_PORT = 11811
+_HIGHEST_PORT = 65535
+_IPV4_PARTS, _BYTE, _FIRST_MULTICAST = 4, 255, 224
+#: RFC 1123, and underscores, which resolvers accept.
+_HOST_NAME = re.compile(r"(?=.{1,253}\Z)[A-Za-z0-9_]([A-Za-z0-9_.-]*[A-Za-z0-9_])?\Z")
+_LIKE_IPV4 = re.compile(r"[0-9.]+\Z")
+#: Linux has names of up to 15 characters.
+_INTERFACE = re.compile(r"[A-Za-z0-9_.-]{1,15}\Z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,16 +151,6 @@ def key_file_problem(text: str) -> str | None:
     if not text.isprintable() or set(text) & set('"\\$'):
         return "contains quotes, backslashes, '$' or control characters, which ssh does not accept"
     return None
-
-
-DEFAULT_SERVER_PORT = 11811
-_HIGHEST_PORT = 65535
-_IPV4_PARTS, _BYTE, _FIRST_MULTICAST = 4, 255, 224
-#: RFC 1123, and underscores, which resolvers accept.
-_HOST_NAME = re.compile(r"(?=.{1,253}\Z)[A-Za-z0-9_]([A-Za-z0-9_.-]*[A-Za-z0-9_])?\Z")
-_LIKE_IPV4 = re.compile(r"[0-9.]+\Z")
-#: Linux has names of up to 15 characters.
-_INTERFACE = re.compile(r"[A-Za-z0-9_.-]{1,15}\Z")
 
 
 class DiscoveryKind(StrEnum):

@@ -26,6 +26,19 @@ NOT_IN_WHEELS = frozenset(
         "vision_msgs",
     )
 )
+#: Where PyPI has another name for a module that robots often import: another package, or none, has
+#: the name of the module.
+_DISTRIBUTIONS = {
+    "can": "python-can",
+    "cv2": "opencv-python",
+    "PIL": "pillow",
+    "RPi": "RPi.GPIO",
+    "serial": "pyserial",
+    "sklearn": "scikit-learn",
+    "usb": "pyusb",
+    "yaml": "pyyaml",
+    "zmq": "pyzmq",
+}
 
 
 def used_packages(system: System) -> dict[str, Node]:
@@ -41,21 +54,6 @@ def used_packages(system: System) -> dict[str, Node]:
 
 def _debian_name(package: str) -> str:
     return f"ros-jazzy-{package.replace('_', '-')}"
-
-
-#: Where PyPI has another name for a module that robots often import: another package, or none, has
-#: the name of the module.
-_DISTRIBUTIONS = {
-    "can": "python-can",
-    "cv2": "opencv-python",
-    "PIL": "pillow",
-    "RPi": "RPi.GPIO",
-    "serial": "pyserial",
-    "sklearn": "scikit-learn",
-    "usb": "pyusb",
-    "yaml": "pyyaml",
-    "zmq": "pyzmq",
-}
 
 
 def how_to_build(package: str, folder: Path | None) -> str:

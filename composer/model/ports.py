@@ -14,6 +14,11 @@ from composer.language.templates import Template
 from composer.language.tree import Plain
 from composer.model.qos import QosProfile
 
+#: Default timeout of clients for the server and its response.
+CALL_TIMEOUT_MS = 5000.0
+#: The parameter of every ROS node that selects the time of /clock.
+USE_SIM_TIME = "use_sim_time"
+
 
 class PeriodUnit(StrEnum):
     """The key under which a timer's period is declared."""
@@ -237,10 +242,6 @@ class FeedbackSteps:
     span: Span = field(compare=False)
 
 
-#: Default timeout of clients for the server and its response.
-CALL_TIMEOUT_MS = 5000.0
-
-
 @dataclass(frozen=True, slots=True)
 class Port:
     """An endpoint of a topic, service or action in a node of a system."""
@@ -300,10 +301,6 @@ class Timer:
     reentrant: bool = False
     always_on: bool = False  # also runs while its node is inactive
     description: str = ""
-
-
-#: The parameter of every ROS node that selects the time of /clock.
-USE_SIM_TIME = "use_sim_time"
 
 
 class ParameterType(StrEnum):

@@ -11,6 +11,18 @@ from enum import StrEnum
 
 from composer.base.fast_dataclass import dataclass
 
+DURATIONS = ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms")
+#: The policies that decide whether two endpoints match, and why they do not.
+DECIDING_POLICIES = {
+    "reliability": "the publisher does not send lost messages again",
+    "durability": "the publisher does not keep messages for late joiners",
+    "deadline_ms": "the publisher offers a longer deadline than the subscription requests",
+    "liveliness": "the publisher does not assert its liveliness manually",
+    "liveliness_lease_duration_ms": (
+        "the publisher may be silent for longer than the subscription allows"
+    ),
+}
+
 
 class History(StrEnum):
     """How many samples to keep."""
@@ -47,7 +59,6 @@ WORDS: Mapping[str, type[StrEnum]] = {
     "durability": Durability,
     "liveliness": Liveliness,
 }
-DURATIONS = ("deadline_ms", "lifespan_ms", "liveliness_lease_duration_ms")
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,16 +159,6 @@ _MISMATCHES: Mapping[str, tuple[StrEnum, StrEnum]] = {
     "reliability": (Reliability.BEST_EFFORT, Reliability.RELIABLE),
     "durability": (Durability.VOLATILE, Durability.TRANSIENT_LOCAL),
     "liveliness": (Liveliness.AUTOMATIC, Liveliness.MANUAL_BY_TOPIC),
-}
-#: The policies that decide whether two endpoints match, and why they do not.
-DECIDING_POLICIES = {
-    "reliability": "the publisher does not send lost messages again",
-    "durability": "the publisher does not keep messages for late joiners",
-    "deadline_ms": "the publisher offers a longer deadline than the subscription requests",
-    "liveliness": "the publisher does not assert its liveliness manually",
-    "liveliness_lease_duration_ms": (
-        "the publisher may be silent for longer than the subscription allows"
-    ),
 }
 
 

@@ -15,6 +15,9 @@ from composer.language.tree import Plain
 from composer.model.names import matches_wildcard
 from composer.model.ports import ChannelKind, LogLevel
 
+#: The states that nodes must have, by their keys in the system.
+States = tuple[tuple[Located[str], str], ...]
+
 
 class Verb(StrEnum):
     """What a step does, by its key."""
@@ -111,10 +114,6 @@ class EventKind(StrEnum):
             EventKind.RESPONSE: ChannelKind.SERVICE,
             EventKind.RESULT: ChannelKind.ACTION,
         }.get(self)
-
-
-#: The states that nodes must have, by their keys in the system.
-States = tuple[tuple[Located[str], str], ...]
 
 
 @dataclass(frozen=True, slots=True)

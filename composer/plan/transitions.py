@@ -19,6 +19,11 @@ TransitionName: TypeAlias = Literal["configure", "activate", "deactivate", "clea
 _UPWARD = ("configure", "activate")
 _ACTIVE, _INACTIVE = PrimaryState.ACTIVE, PrimaryState.INACTIVE
 _RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
+#: The state in which each transition ends; shutdown leaves the primary states of a plan.
+REACHED = {
+    name: PrimaryState.UNCONFIGURED if item.goal == FINALIZED else PrimaryState(item.goal)
+    for name, item in TRANSITIONS.items()
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +51,6 @@ class Step:
     def __str__(self) -> str:
         after = f" after {' '.join(f'#{number}' for number in self.after)}" if self.after else ""
         return f"#{self.number} {self.transition} {self.full_name}{after}: {self.cause}"
-
-
-#: The state in which each transition ends; shutdown leaves the primary states of a plan.
-REACHED = {
-    name: PrimaryState.UNCONFIGURED if item.goal == FINALIZED else PrimaryState(item.goal)
-    for name, item in TRANSITIONS.items()
-}
 
 
 @dataclass(frozen=True, slots=True)

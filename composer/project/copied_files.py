@@ -35,6 +35,38 @@ _EXPRESSIONS = {"folders": "(?:.*/)?", "rest": ".*", "part": "[^/]*", "one": "[^
 _CLASSES = {"alpha": "a-zA-Z", "digit": "0-9", "alnum": "a-zA-Z0-9", "space": r"\s"}
 _CLASSES |= {"upper": "A-Z", "lower": "a-z", "xdigit": "0-9a-fA-F"}
 
+#: In a workspace: it holds a copy of a project, which may be replaced.
+MARK = ".compose-sync"
+#: What each computer makes for itself, and repositories; as patterns of git.
+_NOT_COPIED = (
+    *(".git", ".venv", "venv", "__pycache__", "node_modules"),
+    *("/build", "/install", "/log", "/logs", f"/{MARK}"),
+)
+_SECRET_NAMES = (
+    *(".env", ".env.*", "!.env.example", "!.env.sample", "!.env.template"),
+    *("id_rsa", "id_dsa", "id_ecdsa", "id_ed25519", "id_ecdsa_sk", "id_ed25519_sk", "*.ppk"),
+    *(".netrc", ".pgpass", ".pypirc", ".git-credentials", ".ssh", ".gnupg", ".aws"),
+)
+#: Of a file that only its owner may read. Names of source files end otherwise.
+_KEY_NAME = re.compile(
+    r"id_[\w-]+|.*(key|secret|credential|token|password|passwd|psk)s?(\.(txt|json|bak|old))?"
+    r"|.*(secret|credential|token|password)s?\.(ya?ml|toml|ini|cfg|conf)"
+    r"|.*\.(pem|der|key|p8|p12|pfx|jks|keystore|kdbx|gpg|asc|age|env|ovpn)",
+    re.IGNORECASE | re.DOTALL,
+)
+_PRIVATE_KEY = rb"-{4,5} ?BEGIN [A-Z0-9 ]*PRIVATE KEY"
+_KEY_CONTENT = re.compile(
+    rb"^(\xef\xbb\xbf)?[ \t]*(%b|PuTTY-User-Key-File|AGE-SECRET-KEY-|PrivateKey ?=)" % _PRIVATE_KEY,
+    re.MULTILINE,
+)
+#: In a file that only its owner may read, such as the JSON file of a service account.
+_KEY_ANYWHERE = re.compile(_PRIVATE_KEY)
+_HEAD_BYTES = 16_384  # text may precede a key
+_OTHER_USERS = 0o077
+_PRIVATE = "the private key of a host"
+#: The reason for files that no computer needs from another one.
+_MADE_THERE = "made on each computer"
+
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
@@ -122,39 +154,6 @@ def _expression(word: re.Match[str]) -> str:
     begin = "^" if letters[0] in negations else ""
     escaped = re.sub(r"[][&|~^]", r"\\\g<0>", letters[len(begin) :])
     return f"(?!/)[{begin}{escaped}]"
-
-
-#: In a workspace: it holds a copy of a project, which may be replaced.
-MARK = ".compose-sync"
-#: What each computer makes for itself, and repositories; as patterns of git.
-_NOT_COPIED = (
-    *(".git", ".venv", "venv", "__pycache__", "node_modules"),
-    *("/build", "/install", "/log", "/logs", f"/{MARK}"),
-)
-_SECRET_NAMES = (
-    *(".env", ".env.*", "!.env.example", "!.env.sample", "!.env.template"),
-    *("id_rsa", "id_dsa", "id_ecdsa", "id_ed25519", "id_ecdsa_sk", "id_ed25519_sk", "*.ppk"),
-    *(".netrc", ".pgpass", ".pypirc", ".git-credentials", ".ssh", ".gnupg", ".aws"),
-)
-#: Of a file that only its owner may read. Names of source files end otherwise.
-_KEY_NAME = re.compile(
-    r"id_[\w-]+|.*(key|secret|credential|token|password|passwd|psk)s?(\.(txt|json|bak|old))?"
-    r"|.*(secret|credential|token|password)s?\.(ya?ml|toml|ini|cfg|conf)"
-    r"|.*\.(pem|der|key|p8|p12|pfx|jks|keystore|kdbx|gpg|asc|age|env|ovpn)",
-    re.IGNORECASE | re.DOTALL,
-)
-_PRIVATE_KEY = rb"-{4,5} ?BEGIN [A-Z0-9 ]*PRIVATE KEY"
-_KEY_CONTENT = re.compile(
-    rb"^(\xef\xbb\xbf)?[ \t]*(%b|PuTTY-User-Key-File|AGE-SECRET-KEY-|PrivateKey ?=)" % _PRIVATE_KEY,
-    re.MULTILINE,
-)
-#: In a file that only its owner may read, such as the JSON file of a service account.
-_KEY_ANYWHERE = re.compile(_PRIVATE_KEY)
-_HEAD_BYTES = 16_384  # text may precede a key
-_OTHER_USERS = 0o077
-_PRIVATE = "the private key of a host"
-#: The reason for files that no computer needs from another one.
-_MADE_THERE = "made on each computer"
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,8 @@ from composer.project import Project
 RESOURCE_TYPE = "ros2_composer"
 _INDEX = Path("share", "ament_index", "resource_index", RESOURCE_TYPE)
 SUFFIX = ".yaml"
+#: A node type is named by the stem of its file, which must not contain a path.
+_TYPE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +77,6 @@ def _registered(prefix: Path) -> list[str]:
     with suppress(OSError):
         return sorted(path.name for path in (prefix / _INDEX).iterdir() if path.is_file())
     return []
-
-
-#: A node type is named by the stem of its file, which must not contain a path.
-_TYPE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ _MISSING = "does not exist"
 #: In one setting. There are fewer rules, each with a code and a name.
 _MAX_RULES = 500
 _Item = TypeVar("_Item", Located[str], tuple[Located[str], Severity])
+_WORDS = {Severity.WARNING: "a warning", Severity.INFO: "an info"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,9 +212,6 @@ def check_rule_settings(settings: Settings, rules: Collection[Rule]) -> Iterator
             yield _unknown(text, rules)
         elif rule.severity is Severity.ERROR and severity is not Severity.ERROR:
             yield _about_error(text, f"made {_WORDS[severity]}")
-
-
-_WORDS = {Severity.WARNING: "a warning", Severity.INFO: "an info"}
 
 
 def _is_selected(rule: Rule, settings: Settings) -> bool:

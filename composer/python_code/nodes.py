@@ -36,6 +36,7 @@ _UNDECLARED = frozenset(
     {"allow_undeclared_parameters", "automatically_declare_parameters_from_overrides"}
     | {"get_parameters_by_prefix", "has_parameter"}
 )
+_GOAL = "composer.behavior.Goal[{0}.Goal, {0}.Feedback]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,6 @@ GENERAL_HANDLERS: Mapping[str, Signature] = {
     "on_error": Signature((("cause", "Exception"),)),
     "on_parameters": Signature((("changes", "composer.behavior.Changes"),)),
 }
-_GOAL = "composer.behavior.Goal[{0}.Goal, {0}.Feedback]"
 #: The handlers of a port, by the beginning of their names.
 _PORT_HANDLERS: Mapping[PortKind, Mapping[str, Signature]] = {
     PortKind.SUBSCRIPTION: {"on_": Signature((("message", "{0}"),))},

@@ -14,6 +14,12 @@ from composer.base.diagnostics import Diagnostic, Rule, registered_rules, sugges
 from composer.base.fast_dataclass import dataclass
 from composer.base.folders import rules_folder
 
+_PAGE = re.compile(
+    r"# .+\n\n\*\w+\* - (?P<summary>.+)\n\n(?P<why>(?:.+\n)+)\n"
+    r"(?P<bad>(?s:.+))\nUse instead:\n\n(?P<good>(?s:.+))"
+)
+_BLOCK = re.compile(r"(?:`(?P<name>.+)`:\n\n)?```\w*\n(?P<text>(?:.*\n)*?)```\n")
+
 
 def all_rules() -> tuple[Rule, ...]:
     """Return all rules, sorted by code. Imports every module that registers rules."""
@@ -57,13 +63,6 @@ def select_diagnostics(
         if (not selected or any(diagnostic.rule.matches(text) for text in selected))
         and not any(diagnostic.rule.matches(text) for text in ignored)
     ]
-
-
-_PAGE = re.compile(
-    r"# .+\n\n\*\w+\* - (?P<summary>.+)\n\n(?P<why>(?:.+\n)+)\n"
-    r"(?P<bad>(?s:.+))\nUse instead:\n\n(?P<good>(?s:.+))"
-)
-_BLOCK = re.compile(r"(?:`(?P<name>.+)`:\n\n)?```\w*\n(?P<text>(?:.*\n)*?)```\n")
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,25 @@ WRONG_CLASS = error("RC462", "wrong-class")
 
 #: How the names of handlers begin.
 _PREFIXES = ("on_", "accept_")
+_BLOCKING = re.compile(
+    r"time\.sleep|input|os\.system|os\.wait|os\.waitpid"
+    r"|subprocess\.(run|call|check_call|check_output|getoutput|getstatusoutput)"
+    r"|requests\.(get|post|put|patch|delete|head|options|request)"
+    r"|urllib\.request\.(urlopen|urlretrieve)"
+    r"|socket\.create_connection"
+    r"|rclpy\.(spin|spin_once|spin_until_future_complete)"
+    r"|(.+\.)?spin_until_future_complete"
+    r"|(.+\.)?(sock|socket|connection|conn)\.(recv|recvfrom|recv_into|accept|connect)"
+)
+#: rclpy's synchronous call; calls through the composer's clients are awaited.
+_SYNCHRONOUS_CALL = re.compile(r"(.+\.)?\w*(client|cli)\.call")
+_LEAVES = (ast.Return, ast.Raise, ast.Break)
+_WAITS = (ast.Await, ast.AsyncFor, ast.AsyncWith, ast.Yield, ast.YieldFrom)
+#: Calls that end a loop, that wait, or that would wait if they were awaited.
+_ENDS_OR_WAITS = frozenset(
+    {"exit", "quit", "_exit", "abort"}
+    | {"sleep", "call", "send_goal", "result", "wait", "get", "join"}
+)
 
 
 def check_handlers(context: Context) -> Iterator[Diagnostic]:
@@ -156,27 +175,6 @@ def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
             given = (("type", f"{node.name}.{_stem(name)}"),)
             rule = as_warning(WRONG_MESSAGE_TYPE)
             yield Diagnostic(rule, message, span, (label,), relies_on=given)
-
-
-_BLOCKING = re.compile(
-    r"time\.sleep|input|os\.system|os\.wait|os\.waitpid"
-    r"|subprocess\.(run|call|check_call|check_output|getoutput|getstatusoutput)"
-    r"|requests\.(get|post|put|patch|delete|head|options|request)"
-    r"|urllib\.request\.(urlopen|urlretrieve)"
-    r"|socket\.create_connection"
-    r"|rclpy\.(spin|spin_once|spin_until_future_complete)"
-    r"|(.+\.)?spin_until_future_complete"
-    r"|(.+\.)?(sock|socket|connection|conn)\.(recv|recvfrom|recv_into|accept|connect)"
-)
-#: rclpy's synchronous call; calls through the composer's clients are awaited.
-_SYNCHRONOUS_CALL = re.compile(r"(.+\.)?\w*(client|cli)\.call")
-_LEAVES = (ast.Return, ast.Raise, ast.Break)
-_WAITS = (ast.Await, ast.AsyncFor, ast.AsyncWith, ast.Yield, ast.YieldFrom)
-#: Calls that end a loop, that wait, or that would wait if they were awaited.
-_ENDS_OR_WAITS = frozenset(
-    {"exit", "quit", "_exit", "abort"}
-    | {"sleep", "call", "send_goal", "result", "wait", "get", "join"}
-)
 
 
 def check_blocking(context: Context) -> Iterator[Diagnostic]:

@@ -42,6 +42,15 @@ _OUTSIDE = "record what other programs publish by 'compose record'"
 _MAXIMUM_CANDIDATES = 5
 #: For a kind of port and an interface: the names of such ports, each with their nodes.
 _ChannelNames: TypeAlias = dict[tuple[PortKind, str], dict[str, set[str]]]
+#: Of a port without a counterpart: the rule, what no other node does, and what its own node does.
+_UNCONNECTED = {
+    PortKind.CLIENT: (CLIENT_WITHOUT_SERVER, "provides", "calls"),
+    PortKind.ACTION_CLIENT: (CLIENT_WITHOUT_SERVER, "provides", "calls"),
+    PortKind.SUBSCRIPTION: (SUBSCRIPTION_WITHOUT_PUBLISHER, "publishes", "subscribes to"),
+    PortKind.PUBLISHER: (PUBLISHER_WITHOUT_SUBSCRIPTION, "subscribes to", "publishes"),
+}
+#: Names and patterns that ``recording`` lists and that are looked for; a file lists a few.
+_MAX_PATTERNS = 50
 
 
 def unconnected_ports(context: Context, kind: PortKind) -> Iterator[PortOfNode]:
@@ -213,15 +222,6 @@ def _channel_names(context: Context) -> _ChannelNames:
     return found
 
 
-#: Of a port without a counterpart: the rule, what no other node does, and what its own node does.
-_UNCONNECTED = {
-    PortKind.CLIENT: (CLIENT_WITHOUT_SERVER, "provides", "calls"),
-    PortKind.ACTION_CLIENT: (CLIENT_WITHOUT_SERVER, "provides", "calls"),
-    PortKind.SUBSCRIPTION: (SUBSCRIPTION_WITHOUT_PUBLISHER, "publishes", "subscribes to"),
-    PortKind.PUBLISHER: (PUBLISHER_WITHOUT_SUBSCRIPTION, "subscribes to", "publishes"),
-}
-
-
 @limited
 def check_unconnected_port(context: Context) -> Iterator[Diagnostic]:
     """Check for topics, services and actions that have ports of one side only."""
@@ -273,10 +273,6 @@ def undescribed_node(context: Context) -> str | None:
         if node.gets_undeclared and not node.ports and node.name.value not in containers
     )
     return next(names, None)
-
-
-#: Names and patterns that ``recording`` lists and that are looked for; a file lists a few.
-_MAX_PATTERNS = 50
 
 
 def check_recorded_name(context: Context) -> Iterator[Diagnostic]:

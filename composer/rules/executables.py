@@ -37,6 +37,9 @@ INVALID_EXECUTABLE = error("RC473", "invalid-executable")
 
 #: Arguments with these suffixes are files, and are looked for.
 _SCRIPTS = (".py", ".sh")
+#: The name of a class in C++ or Python.
+_CLASS = re.compile(r"[^\W\d]\w*((::|[.:])[^\W\d]\w*)*")
+_CONTAINERS = (ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
 
 
 def check_unknown_executable(context: Context) -> Iterator[Diagnostic]:
@@ -200,11 +203,6 @@ def check_managed_task(context: Context) -> Iterator[Diagnostic]:
                 spans.get("lifecycle", executable.span),
                 hint="remove 'lifecycle: managed', or 'kind: task'",
             )
-
-
-#: The name of a class in C++ or Python.
-_CLASS = re.compile(r"[^\W\d]\w*((::|[.:])[^\W\d]\w*)*")
-_CONTAINERS = (ImplementationKind.EXECUTABLE, ImplementationKind.EXTERNAL)
 
 
 def check_component(context: Context) -> Iterator[Diagnostic]:

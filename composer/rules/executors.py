@@ -32,6 +32,8 @@ LOST_BETWEEN_PROCESSES = info("RC480", "lost-between-processes")
 _EXECUTOR_BUSY = replace(EXECUTOR_OVERLOADED, severity=Severity.WARNING)
 #: From this load on, an executor is busy.
 _BUSY = 0.7
+#: Maximum number of callbacks in a message and its labels, highest load first.
+SHOWN = 4
 
 
 def check_unknown_executor(context: Context) -> Iterator[Diagnostic]:
@@ -148,10 +150,6 @@ def check_executor_outside_process(context: Context) -> Iterator[Diagnostic]:
 def _cpu_text(numbers: tuple[int, ...] | list[int]) -> str:
     word = "CPU" if len(numbers) == 1 else "CPUs"
     return f"{word} {', '.join(map(str, numbers))}"
-
-
-#: Maximum number of callbacks in a message and its labels, highest load first.
-SHOWN = 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,8 @@ INDEX_OUT_OF_RANGE = warning("RC308", "index-out-of-range")
 UNKNOWN_FIELD = error("RC304", "unknown-field")
 INVALID_VALUE = error("RC305", "invalid-value")
 UNKNOWN_ENUMERATOR = warning("RC306", "unknown-enumerator")
+#: Maximum number of further uses of a variable to show.
+_SHOWN_USES = 3
 
 
 def check_unknown_name(context: Context) -> Iterator[Diagnostic]:
@@ -54,10 +56,6 @@ def _name_hint(name: str, site: ExpressionSite) -> str | None:
     if own and any(name in names for names in EVENT_NAMES.values()):
         return f"use '{own[0]}' here"
     return suggestion(name, site.names)
-
-
-#: Maximum number of further uses of a variable to show.
-_SHOWN_USES = 3
 
 
 def check_unknown_state(context: Context) -> Iterator[Diagnostic]:

@@ -23,6 +23,9 @@ from composer.rules.analysis.frames import (
 CONFLICTING_TRANSFORMS = error("RC510", "conflicting-transforms")
 UNCONNECTED_FRAMES = error("RC512", "unconnected-frames")
 SEVERAL_FRAME_TREES = warning("RC514", "several-frame-trees")
+_PAIR = 2  # of trees
+_MAX_SEARCHED = 20  # roots that may be misspelled
+_MAX_COMPARED = 50_000  # names of frames
 
 
 def check_unknown_frame(context: Context) -> Iterator[Diagnostic]:
@@ -131,11 +134,6 @@ def _unconnected(tree: FrameTree, gap: Gap) -> Diagnostic:
     close = nearest_parent(tree, root, lambda name: tree.root(name) == first_root)
     hint = f"did you mean '{close}' instead of '{root}'?" if close is not None else None
     return Diagnostic(UNCONNECTED_FRAMES, message, span, (*labels, *begins), hint)
-
-
-_PAIR = 2  # of trees
-_MAX_SEARCHED = 20  # roots that may be misspelled
-_MAX_COMPARED = 50_000  # names of frames
 
 
 def check_several_frame_trees(context: Context) -> Iterator[Diagnostic]:

@@ -20,6 +20,24 @@ from composer.rules.analysis.subjects import earlier_errors
 UNKNOWN_NODE_TYPE = error("RC201", "unknown-node-type")
 REPLACED_NODE_TYPE = warning("RC214", "replaced-node-type")
 NODE_TYPE_NAME = warning("RC215", "node-type-name")
+_SUFFIXES = frozenset({".yaml", ".yml"})
+IDLE_PORT = warning("RC438", "idle-port")
+SEVERAL_IMPLEMENTATIONS = error("RC470", "several-implementations")
+SETTING_WITHOUT_EFFECT = error("RC474", "setting-without-effect")
+_OTHERS = {
+    ImplementationKind.EXECUTABLE: "an executable",
+    ImplementationKind.COMPONENT: "a component",
+    ImplementationKind.EXTERNAL: "an external node",
+}
+#: Keys of a node's entry that need its process, or its code.
+_NOT_OF_OTHERS = frozenset({"executor", "introspection"})
+_NOT_OF_EXTERNAL = _NOT_OF_OTHERS | {"log_level"}
+#: What a node without a behavior can do instead, by the kind of its port or timer.
+_MISSING_REACTIONS = {
+    "timer": "add 'publish', 'call', 'set' or 'log'",
+    PortKind.SERVICE.value: "add 'respond'",
+    PortKind.ACTION_SERVER.value: "add 'result'",
+}
 
 
 def check_unknown_node_type(context: Context) -> Iterator[Diagnostic]:
@@ -66,9 +84,6 @@ def check_replaced_node_type(context: Context) -> Iterator[Diagnostic]:
             )
 
 
-_SUFFIXES = frozenset({".yaml", ".yml"})
-
-
 def check_node_type_name(context: Context) -> Iterator[Diagnostic]:
     """Compare the name of a node type, or the types of nodes, with the names of their files."""
     system = context.system
@@ -105,11 +120,6 @@ def unused_node_types(loaded: Iterable[System]) -> Iterator[Diagnostic]:
         if is_unused and not is_opaque(node_type.name.value):
             message = f"no system here uses node type '{node_type.name}'"
             yield Diagnostic(UNUSED_DECLARATION, message, node_type.name.span)
-
-
-IDLE_PORT = warning("RC438", "idle-port")
-SEVERAL_IMPLEMENTATIONS = error("RC470", "several-implementations")
-SETTING_WITHOUT_EFFECT = error("RC474", "setting-without-effect")
 
 
 def check_several_implementations(context: Context) -> Iterator[Diagnostic]:
@@ -158,16 +168,6 @@ def check_class_setting(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 SETTING_WITHOUT_EFFECT, message, span, hint="remove it, or write a behavior"
             )
-
-
-_OTHERS = {
-    ImplementationKind.EXECUTABLE: "an executable",
-    ImplementationKind.COMPONENT: "a component",
-    ImplementationKind.EXTERNAL: "an external node",
-}
-#: Keys of a node's entry that need its process, or its code.
-_NOT_OF_OTHERS = frozenset({"executor", "introspection"})
-_NOT_OF_EXTERNAL = _NOT_OF_OTHERS | {"log_level"}
 
 
 def check_in_process_setting(context: Context) -> Iterator[Diagnostic]:
@@ -235,14 +235,6 @@ def _settings_of_port(port: Port) -> Iterator[tuple[str, Span]]:
     for name, is_set in (("reentrant", port.reentrant), ("always_on", port.always_on)):
         if is_set:
             yield f"'{name}' of {port.kind} '{port.name}'", port.span
-
-
-#: What a node without a behavior can do instead, by the kind of its port or timer.
-_MISSING_REACTIONS = {
-    "timer": "add 'publish', 'call', 'set' or 'log'",
-    PortKind.SERVICE.value: "add 'respond'",
-    PortKind.ACTION_SERVER.value: "add 'result'",
-}
 
 
 def check_idle_port(context: Context) -> Iterator[Diagnostic]:

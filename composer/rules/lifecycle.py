@@ -26,6 +26,8 @@ from composer.rules.analysis.subjects import PORT_SECTIONS, earlier_errors
 
 START_ORDER = warning("RC402", "start-order")
 IMPOSSIBLE_WATCH = error("RC404", "impossible-watch")
+_RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
+FAILURE_SETTINGS = warning("RC406", "failure-settings")
 
 
 def check_dependency_cycle(context: Context) -> Iterator[Diagnostic]:
@@ -55,9 +57,6 @@ def _dependency(system: System, name: str, other: str) -> Dependency:
     node = system.node(name)
     found = node.depends_on if node is not None else ()
     return next(item for item in found if item.node.value == other)
-
-
-_RANK = {PrimaryState.UNCONFIGURED: 0, PrimaryState.INACTIVE: 1, PrimaryState.ACTIVE: 2}
 
 
 def check_dependency_not_reached(context: Context) -> Iterator[Diagnostic]:
@@ -162,9 +161,6 @@ def _compare_silence(
         (Label(endpoint.port.name.span, "the watched publisher"),),
         f"allow for late messages, for example {number(3 * period_ms)}",
     )
-
-
-FAILURE_SETTINGS = warning("RC406", "failure-settings")
 
 
 def check_endless_restart(context: Context) -> Iterator[Diagnostic]:

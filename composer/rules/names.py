@@ -27,6 +27,7 @@ from composer.rules.analysis.subjects import connection_subjects, namespace_subj
 INVALID_NAME = error("RC221", "invalid-name")
 DEEP_NAMESPACE = warning("RC231", "deep-namespace")
 HIDDEN_NAME = info("RC232", "hidden-name")
+_MAX_LEVELS = 3
 
 
 def check_invalid_node_name(context: Context) -> Iterator[Diagnostic]:
@@ -197,9 +198,6 @@ def check_duplicate_port_name(context: Context) -> Iterator[Diagnostic]:
                     (Label(earlier.name.span, f"the {earlier.kind}"),),
                     "rename one of them",
                 )
-
-
-_MAX_LEVELS = 3
 
 
 def check_deep_namespace(context: Context) -> Iterator[Diagnostic]:

@@ -32,6 +32,15 @@ from composer.rules.expressions import INDEX_OUT_OF_RANGE
 
 PARAMETER_VALUE = error("RC421", "parameter-value")
 PARAMETER_DECLARATION = error("RC425", "parameter-declaration")
+_WITH_RANGE = frozenset(
+    {
+        ParameterType.INTEGER,
+        ParameterType.DOUBLE,
+        ParameterType.INTEGER_ARRAY,
+        ParameterType.DOUBLE_ARRAY,
+        ParameterType.BYTE_ARRAY,
+    }
+)
 
 
 def check_parameter_type(context: Context) -> Iterator[Diagnostic]:
@@ -101,17 +110,6 @@ def check_parameter_choice(context: Context) -> Iterator[Diagnostic]:
             suggestion(str(invalid), [str(choice) for choice in choices.value]),
             (("parameter", parameter.name.value),),
         )
-
-
-_WITH_RANGE = frozenset(
-    {
-        ParameterType.INTEGER,
-        ParameterType.DOUBLE,
-        ParameterType.INTEGER_ARRAY,
-        ParameterType.DOUBLE_ARRAY,
-        ParameterType.BYTE_ARRAY,
-    }
-)
 
 
 def check_parameter_declaration(context: Context) -> Iterator[Diagnostic]:

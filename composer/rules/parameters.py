@@ -38,6 +38,9 @@ _UNKNOWN_PARAMETER_IF_PASSED_ON = replace(UNKNOWN_PARAMETER, severity=Severity.I
 _MISSING_IF_PASSED_ON = replace(MISSING_PARAMETER, severity=Severity.WARNING)
 _SEVERAL = 2
 _SHOWN_VALUES = 3
+#: A program may create a node with the name of the section, and gets its values.
+_UNMATCHED_FOR_PROGRAMS = replace(UNMATCHED_PARAMETERS, severity=Severity.INFO)
+_SHOWN_SECTIONS = 3
 
 
 def check_unknown_parameter(context: Context) -> Iterator[Diagnostic]:
@@ -234,11 +237,6 @@ def _similar(node: Node, parameter: Parameter) -> Iterator[Diagnostic]:
                 f"did you mean '{meant}'?",
             )
             return
-
-
-#: A program may create a node with the name of the section, and gets its values.
-_UNMATCHED_FOR_PROGRAMS = replace(UNMATCHED_PARAMETERS, severity=Severity.INFO)
-_SHOWN_SECTIONS = 3
 
 
 def check_unmatched_parameters(context: Context) -> Iterator[Diagnostic]:

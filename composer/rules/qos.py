@@ -19,6 +19,15 @@ from composer.rules.analysis.subjects import earlier_errors, unknown_subjects
 from composer.rules.references import UNDECLARED_NAME
 
 QOS_IMPLICIT = info("RC501", "qos-implicit")
+QOS_DURATION_TOO_SHORT = warning("RC312", "qos-duration-too-short")
+UNSUITED_QOS = info("RC314", "unsuited-qos")
+#: In hertz; on slower topics a message is taken before the next one arrives.
+FAST_HZ = 10.0
+_SHOWN_SINKS = 3
+_SENSOR_PACKAGE = "sensor_msgs/msg/"
+#: Messages of that package that are small, and whose consumers usually request reliable QoS.
+_STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"})
+_COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")
 
 
 def known_profiles(context: Context) -> frozenset[str]:
@@ -125,10 +134,6 @@ def check_qos_implicit(context: Context) -> Iterator[Diagnostic]:
                 )
 
 
-QOS_DURATION_TOO_SHORT = warning("RC312", "qos-duration-too-short")
-UNSUITED_QOS = info("RC314", "unsuited-qos")
-
-
 def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
     """Compare deadlines and lifespans with the periods of the publishing timers."""
     for endpoint, period_s in context.once(timed_publishers):
@@ -168,10 +173,6 @@ def check_lease_too_short(context: Context) -> Iterator[Diagnostic]:
                 qos.policy_span("liveliness_lease_duration_ms"),
                 hint="make the lease longer than the period, with some margin",
             )
-
-
-#: In hertz; on slower topics a message is taken before the next one arrives.
-FAST_HZ = 10.0
 
 
 def check_shallow_queue(context: Context) -> Iterator[Diagnostic]:
@@ -218,12 +219,6 @@ def check_keep_all(context: Context) -> Iterator[Diagnostic]:
                 )
 
 
-_SHOWN_SINKS = 3
-_SENSOR_PACKAGE = "sensor_msgs/msg/"
-#: Messages of that package that are small, and whose consumers usually request reliable QoS.
-_STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"})
-
-
 def check_reliable_sensor_stream(context: Context) -> Iterator[Diagnostic]:
     """Check publishers of sensor messages with a known rate."""
     for channel in context.channels:
@@ -268,9 +263,6 @@ def _reliable_stream(port: Port, rate_hz: float, sinks: tuple[PortOfNode, ...]) 
         hint,
         relies_on=(("topic qos", port.full_name),),
     )
-
-
-_COMMAND = re.compile(r"(^|[/_])(cmd|command|commands|order|orders)($|[/_])")
 
 
 def check_unreliable_command(context: Context) -> Iterator[Diagnostic]:

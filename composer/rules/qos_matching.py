@@ -31,6 +31,8 @@ _MAX_CONFLICTS = 10
 
 #: Endpoints by what these policies are, with the profile of the first one.
 _Groups = Sequence[tuple[QosProfile, list[PortOfNode]]]
+#: Maximum number of further endpoints to show for one problem.
+_SHOWN_ENDPOINTS = 3
 
 
 class _Origin(IntEnum):
@@ -191,10 +193,6 @@ def _connection_spans(context: Context) -> dict[str, Span]:
     """Return where connections name ports, the first time."""
     ends = [end for connection in context.system.connections for end in connection.ends]
     return {end.text.value: end.text.span for end in reversed(ends)}
-
-
-#: Maximum number of further endpoints to show for one problem.
-_SHOWN_ENDPOINTS = 3
 
 
 def check_qos_incompatible(context: Context) -> Iterator[Diagnostic]:

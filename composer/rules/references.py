@@ -24,6 +24,8 @@ UNKNOWN_NODE = error("RC202", "unknown-node")
 UNKNOWN_PORT = error("RC203", "unknown-port")
 UNDECLARED_NAME = error("RC205", "undeclared-name")
 PORT_CONNECTED_TWICE = error("RC212", "port-connected-twice")
+_SECTIONS = {"node": "nodes", "executor": "executors", "process": "processes", "host": "hosts"}
+_PORT_SECTIONS = frozenset(kind.section for kind in PortKind)
 
 
 def endpoints(system: System) -> Iterator[tuple[Endpoint, Connection | None]]:
@@ -54,9 +56,6 @@ def absence(system: System, section: str, name: str, noun: str) -> Absence:
         condition = f'{left_out.key}: "{left_out.condition}"'
     hint = f"write {condition} here too, or remove the condition" if left_out.condition else None
     return Absence(text, labels, hint)
-
-
-_SECTIONS = {"node": "nodes", "executor": "executors", "process": "processes", "host": "hosts"}
 
 
 def declared(context: Context) -> Mapping[str, Mapping[str, None]]:
@@ -143,9 +142,6 @@ def _dependencies(context: Context) -> Iterator[tuple[str, Located[str]]]:
         for dependency in node.depends_on:
             verb = "has the container" if dependency.is_container else "depends on"
             yield f"node '{node.name}' {verb} '{dependency.node}'", dependency.node
-
-
-_PORT_SECTIONS = frozenset(kind.section for kind in PortKind)
 
 
 def check_unknown_port(context: Context) -> Iterator[Diagnostic]:

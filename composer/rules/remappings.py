@@ -26,29 +26,7 @@ from composer.rules.analysis.subjects import wiring
 UNKNOWN_REMAPPING = error("RC208", "unknown-remapping")
 REMAPPING_COLLISION = warning("RC226", "remapping-collision")
 UNUSED_REMAPPING = warning("RC241", "unused-remapping")
-
-
-def own_name(node: Node, name: str) -> str:
-    """Return the full name of ``name`` in ``node`` before remapping."""
-    return expand_name(name, node.ros_name.value, node.namespace.value)
-
-
 _Ports = Mapping[str, Sequence[Port]]
-
-
-def _ports_by_name(node: Node) -> _Ports:
-    """Return the ports by their full names before remapping."""
-    ports: dict[str, list[Port]] = defaultdict(list)
-    for port in node.all_ports if node.remappings else ():
-        ports[own_name(node, port.ros_name.value)].append(port)
-    return ports
-
-
-def _matched_ports(node: Node, ports: _Ports, remapping: Remapping) -> Sequence[Port]:
-    """Return the ports whose declared name the remapping replaces."""
-    return ports.get(own_name(node, remapped_name(remapping.source.value)), ())
-
-
 _RULE_IF_PASSED_ON = replace(UNKNOWN_REMAPPING, severity=Severity.INFO)
 #: Topics and services that every ROS node has without declaring them.
 _OF_EVERY_NODE = frozenset(("/clock", "/diagnostics", "/parameter_events", "/rosout"))
@@ -72,6 +50,29 @@ _PRIVATE_OF_EVERY_NODE = frozenset(
         "transition_event",
     )
 )
+_NAMES_IN_CODE = (
+    ImplementationKind.CLASS,
+    ImplementationKind.EXECUTABLE,
+    ImplementationKind.COMPONENT,
+)
+
+
+def own_name(node: Node, name: str) -> str:
+    """Return the full name of ``name`` in ``node`` before remapping."""
+    return expand_name(name, node.ros_name.value, node.namespace.value)
+
+
+def _ports_by_name(node: Node) -> _Ports:
+    """Return the ports by their full names before remapping."""
+    ports: dict[str, list[Port]] = defaultdict(list)
+    for port in node.all_ports if node.remappings else ():
+        ports[own_name(node, port.ros_name.value)].append(port)
+    return ports
+
+
+def _matched_ports(node: Node, ports: _Ports, remapping: Remapping) -> Sequence[Port]:
+    """Return the ports whose declared name the remapping replaces."""
+    return ports.get(own_name(node, remapped_name(remapping.source.value)), ())
 
 
 def check_unknown_remapping(context: Context) -> Iterator[Diagnostic]:
@@ -164,13 +165,6 @@ def _collision(
                 remapping.target.span,
                 (Label(others[0].name.span, "already has this name"),),
             )
-
-
-_NAMES_IN_CODE = (
-    ImplementationKind.CLASS,
-    ImplementationKind.EXECUTABLE,
-    ImplementationKind.COMPONENT,
-)
 
 
 def check_unused_remapping(context: Context) -> Iterator[Diagnostic]:

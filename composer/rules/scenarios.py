@@ -62,6 +62,9 @@ _NEEDED = {
     EventKind.RESULT: Verb.SEND_GOAL,
     Verb.CANCEL: Verb.SEND_GOAL,
 }
+_NOW: dict[str, ValueType] = {"now": NUMBER}
+#: How a goal ends, also one that is not accepted.
+_STATUS = replace(STATUS, words=(*STATUS.words, "rejected"))
 
 
 def check_keys(context: Context) -> Iterator[Diagnostic]:
@@ -246,11 +249,6 @@ def check_values(context: Context) -> Iterator[Diagnostic]:
         channel = None if kind is None else channels.get((kind, event.name.value))
         if channel is not None:
             yield from _event(context, event, channel)
-
-
-_NOW: dict[str, ValueType] = {"now": NUMBER}
-#: How a goal ends, also one that is not accepted.
-_STATUS = replace(STATUS, words=(*STATUS.words, "rejected"))
 
 
 def _event(context: Context, event: Condition, channel: Channel) -> Iterator[Diagnostic]:

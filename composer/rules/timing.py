@@ -31,6 +31,24 @@ from composer.rules.references import UNDECLARED_NAME
 TIMER_PERIOD = error("RC411", "timer-period")
 UNUSUAL_RATE = info("RC412", "unusual-rate")
 UNLIKELY_UNIT = warning("RC533", "unlikely-unit")
+_SHORTEST_S = 0.0001
+_LONGEST_S = 86_400.0
+#: Units of time and rate, as parameters declare them or end with.
+_UNITS = ("Hz", "ms", "s", "us", "ns")
+_EXPECTED_UNITS = {PeriodUnit.MILLISECONDS: "ms", PeriodUnit.HERTZ: "Hz"}
+_UNIT_HINTS = {
+    ("Hz", PeriodUnit.MILLISECONDS): "write 'rate_hz' instead of 'period_ms'",
+    ("ms", PeriodUnit.HERTZ): "write 'period_ms' instead of 'rate_hz'",
+    ("s", PeriodUnit.MILLISECONDS): "multiply it by 1000.0",
+    ("s", PeriodUnit.HERTZ): "write 'period_ms' instead of 'rate_hz', and multiply it by 1000.0",
+}
+#: Lowest and highest usual rate in hertz, by a level of the namespace.
+_BANDS_HZ = {"control": (50.0, 500.0), "perception": (10.0, 30.0)}
+#: How far a rate is from its band, as a factor, before it is reported: working systems differ, and
+#: a period in another unit differs by more.
+_TOLERANCE = 10.0
+IMPOSSIBLE_CHAIN = error("RC415", "impossible-chain")
+UNMEASURED_CHAIN = warning("RC477", "unmeasured-chain")
 
 
 def check_unknown_timer(context: Context) -> Iterator[Diagnostic]:
@@ -44,10 +62,6 @@ def check_unknown_timer(context: Context) -> Iterator[Diagnostic]:
                     unknown.name.span,
                     hint=suggestion(unknown.name.value, unknown.known),
                 )
-
-
-_SHORTEST_S = 0.0001
-_LONGEST_S = 86_400.0
 
 
 def check_timer_period(context: Context) -> Iterator[Diagnostic]:
@@ -92,17 +106,6 @@ def _origin_text(timer: Timer) -> str:
     return ", with the initial parameters"
 
 
-#: Units of time and rate, as parameters declare them or end with.
-_UNITS = ("Hz", "ms", "s", "us", "ns")
-_EXPECTED_UNITS = {PeriodUnit.MILLISECONDS: "ms", PeriodUnit.HERTZ: "Hz"}
-_UNIT_HINTS = {
-    ("Hz", PeriodUnit.MILLISECONDS): "write 'rate_hz' instead of 'period_ms'",
-    ("ms", PeriodUnit.HERTZ): "write 'period_ms' instead of 'rate_hz'",
-    ("s", PeriodUnit.MILLISECONDS): "multiply it by 1000.0",
-    ("s", PeriodUnit.HERTZ): "write 'period_ms' instead of 'rate_hz', and multiply it by 1000.0",
-}
-
-
 def check_period_unit(context: Context) -> Iterator[Diagnostic]:
     """Check the timers whose period is a parameter and nothing else."""
     for node in context.system.nodes:
@@ -141,13 +144,6 @@ def _parameter_unit(parameter: Parameter) -> str | None:
     return next((unit for unit in _UNITS if unit.lower() == suffix), None)
 
 
-#: Lowest and highest usual rate in hertz, by a level of the namespace.
-_BANDS_HZ = {"control": (50.0, 500.0), "perception": (10.0, 30.0)}
-#: How far a rate is from its band, as a factor, before it is reported: working systems differ, and
-#: a period in another unit differs by more.
-_TOLERANCE = 10.0
-
-
 def check_unusual_rate(context: Context) -> Iterator[Diagnostic]:
     """Check the fastest timer of each node; slower timers do housekeeping."""
     for node in context.system.nodes:
@@ -178,10 +174,6 @@ def _unusual_rate(
         timer.period.span,
         relies_on=used_parameters(timer.period.value),
     )
-
-
-IMPOSSIBLE_CHAIN = error("RC415", "impossible-chain")
-UNMEASURED_CHAIN = warning("RC477", "unmeasured-chain")
 
 
 @dataclass(frozen=True, slots=True)

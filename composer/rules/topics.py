@@ -30,6 +30,17 @@ COMPETING_COMMANDS = warning("RC328", "competing-commands")
 
 #: For each topic, the topics to which its messages are republished, with the subscription.
 _Steps = dict[str, dict[str, PortOfNode]]
+_VELOCITY_COMMANDS = frozenset(
+    {
+        "ackermann_msgs/msg/AckermannDrive",
+        "ackermann_msgs/msg/AckermannDriveStamped",
+        "geometry_msgs/msg/Twist",
+        "geometry_msgs/msg/TwistStamped",
+    }
+)
+DUPLICATE_SERVER = error("RC321", "duplicate-server")
+UNSUITED_PATTERN = info("RC331", "unsuited-pattern")
+_LONGEST_POLL_S = 1.0
 
 
 def check_topic_loop(context: Context) -> Iterator[Diagnostic]:
@@ -120,16 +131,6 @@ def _is_unconditional(end: PortOfNode) -> bool:
     return reaction is not None and reaction.when is None
 
 
-_VELOCITY_COMMANDS = frozenset(
-    {
-        "ackermann_msgs/msg/AckermannDrive",
-        "ackermann_msgs/msg/AckermannDriveStamped",
-        "geometry_msgs/msg/Twist",
-        "geometry_msgs/msg/TwistStamped",
-    }
-)
-
-
 def check_competing_commands(context: Context) -> Iterator[Diagnostic]:
     """Count the nodes that publish velocity commands on each topic and start active."""
     system = context.system
@@ -153,10 +154,6 @@ def check_competing_commands(context: Context) -> Iterator[Diagnostic]:
                 "use one topic for each, and a node that selects one of them",
                 relies_on=(*wiring(first.node, first.port), *wiring(other.node, other.port)),
             )
-
-
-DUPLICATE_SERVER = error("RC321", "duplicate-server")
-UNSUITED_PATTERN = info("RC331", "unsuited-pattern")
 
 
 def check_duplicate_server(context: Context) -> Iterator[Diagnostic]:
@@ -226,9 +223,6 @@ def _started_too_early(channel: Channel, client: PortOfNode, server: PortOfNode)
         (Label(place, f"'{server.node.name}' starts later"),),
         f"make '{client.node.name}' depend on '{server.node.name}'",
     )
-
-
-_LONGEST_POLL_S = 1.0
 
 
 def check_polled_service(context: Context) -> Iterator[Diagnostic]:

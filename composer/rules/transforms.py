@@ -31,6 +31,10 @@ INVALID_QUATERNION = error("RC516", "invalid-quaternion")
 UNDECLARED_TRANSFORM = error("RC517", "undeclared-transform")
 
 _SUBSCRIPTION = PortKind.SUBSCRIPTION
+_WITH_SUBSCRIPTIONS = (ImplementationKind.DECLARATIVE, ImplementationKind.BEHAVIOR)
+_FULL_TURN = 2.0 * math.pi
+_TOLERANCE = 1.001
+_FIELDS = frozenset({"frame_id", "child_frame_id"})
 
 
 def check_transform_source(context: Context) -> Iterator[Diagnostic]:
@@ -81,9 +85,6 @@ def _from_subscription(node: Node, declared: DynamicTransform, source: str) -> I
         yield Diagnostic(
             TRANSFORM_SOURCE, message, span, (label,), f"types: {', '.join(POSE_TYPES)}"
         )
-
-
-_WITH_SUBSCRIPTIONS = (ImplementationKind.DECLARATIVE, ImplementationKind.BEHAVIOR)
 
 
 def check_undeclared_transform(context: Context) -> Iterator[Diagnostic]:
@@ -152,10 +153,6 @@ def check_invalid_quaternion(context: Context) -> Iterator[Diagnostic]:
             yield Diagnostic(INVALID_QUATERNION, message, static.values.span, hint=hint)
 
 
-_FULL_TURN = 2.0 * math.pi
-_TOLERANCE = 1.001
-
-
 def check_rotation_unit(context: Context) -> Iterator[Diagnostic]:
     """Check the angles of static transforms, once for each node type."""
     for node in context.system.nodes:
@@ -168,9 +165,6 @@ def check_rotation_unit(context: Context) -> Iterator[Diagnostic]:
                         angle.span,
                         hint="write degrees in 'rotation_deg'",
                     )
-
-
-_FIELDS = frozenset({"frame_id", "child_frame_id"})
 
 
 def check_frame_id_slash(context: Context) -> Iterator[Diagnostic]:

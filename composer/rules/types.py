@@ -20,6 +20,8 @@ from composer.rules.analysis.subjects import connection_subjects, port_subject, 
 TYPE_MISMATCH = error("RC303", "type-mismatch")
 
 _SEVERAL = 2
+#: Maximum number of further endpoints with the same wrong type to show.
+_SHOWN_ENDPOINTS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,10 +197,6 @@ def _mismatch(
 
 def _is_of_node_type(endpoint: PortOfNode) -> bool:
     return endpoint.port.interface.span.file != endpoint.node.name.span.file
-
-
-#: Maximum number of further endpoints with the same wrong type to show.
-_SHOWN_ENDPOINTS = 3
 
 
 def check_type_mismatch(context: Context) -> Iterator[Diagnostic]:

@@ -15,6 +15,9 @@ from composer.testing.failures import LogLine, Received, short
 from composer.testing.system_run import Answer
 
 Entry: TypeAlias = "Received | Answer | LogLine | Event"
+#: The fields of a time, which an expression has in seconds.
+_TIME = {"sec", "nanosec"}
+_NUMBERS = (int, float)
 
 
 def time_of(entry: Entry) -> float:
@@ -148,11 +151,6 @@ def _differences(wanted: Any, found: Any, tolerance: float, path: str = "") -> I
         is_near = _is_near(wanted, found, tolerance)
     if not is_near:
         yield f"{path} is {_shown(found)}, not {_shown(wanted)}"
-
-
-#: The fields of a time, which an expression has in seconds.
-_TIME = {"sec", "nanosec"}
-_NUMBERS = (int, float)
 
 
 def _is_near(wanted: Any, found: Any, tolerance: float) -> bool:

@@ -16,6 +16,8 @@ from composer.scenarios.events import Entry, Matcher, time_of
 #: Times may differ in the last digits: they are sums.
 _EPSILON_S = 1e-6
 _MAX_NAMED = 5
+#: What was expected, what was seen, and when that was clear, if before the end of the window.
+Difference = tuple[str, str] | tuple[str, str, float] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +93,6 @@ def check(
         return None
     wanted, seen, *clear_s = found
     return Failure(expectation.span, wanted, seen, *clear_s or [window.end_s])
-
-
-#: What was expected, what was seen, and when that was clear, if before the end of the window.
-Difference = tuple[str, str] | tuple[str, str, float] | None
 
 
 def _matches(

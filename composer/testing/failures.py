@@ -14,6 +14,7 @@ from composer.model.ports import LogLevel
 #: The events that a failure shows, and the messages of one topic among them.
 SHOWN = 20
 _OF_TOPIC = 3
+_LENGTH = 120
 
 
 class TestFailure(AssertionError):
@@ -94,9 +95,6 @@ def unmet(condition: Callable[[], object], timeout_s: float) -> str:
     name = getattr(condition, "__name__", "<lambda>")
     what = "the condition" if name == "<lambda>" else name
     return f"{what} was not true within {timeout_s:g} s"
-
-
-_LENGTH = 120
 
 
 def short(value: Any) -> str:

@@ -31,6 +31,13 @@ TESTER: Final = "compose_test"
 _NO_SERVICES = Introspection(
     parameters=False, rosout=False, type_description=False, lifecycle_services=False
 )
+#: What a node of the system has at the other end of a port of the test, in failures.
+_OTHER_ENDS = {
+    PortKind.SUBSCRIPTION: "publisher on",
+    PortKind.PUBLISHER: "subscription to",
+    PortKind.CLIENT: "service",
+    PortKind.ACTION_CLIENT: "action server",
+}
 
 
 class Tester(Behavior):
@@ -47,15 +54,6 @@ class Tester(Behavior):
         if prefix or not topic:
             raise AttributeError(name)
         return lambda message: self.on_message(topic, message)
-
-
-#: What a node of the system has at the other end of a port of the test, in failures.
-_OTHER_ENDS = {
-    PortKind.SUBSCRIPTION: "publisher on",
-    PortKind.PUBLISHER: "subscription to",
-    PortKind.CLIENT: "service",
-    PortKind.ACTION_CLIENT: "action server",
-}
 
 
 def port_to(tester: Node, kind: PortKind, full_name: str) -> str:

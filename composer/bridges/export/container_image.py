@@ -61,6 +61,21 @@ _PACKAGE = Path(__file__).resolve().parents[2]
 #: Besides the package, in a checkout; in an installation, they are in the package.
 _SHARED = ("docs/rules", "interfaces", "nodes", "schemas", "systems")
 _ABOUT = "Wheel-Version: 1.0\nGenerator: compose export\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+_HEAD = """\
+# Written by 'compose export docker-compose' for the system {system}.
+#
+#   docker compose up --build       docker compose ps       docker compose logs -f
+"""
+_END = """\
+#
+# 'on_failure: shutdown' of the system: let all processes end with the first one that ends.
+#
+#   docker compose up --abort-on-container-exit
+"""
+_HOST = (
+    "ROS nodes of one computer exchange messages by shared memory. Containers do as well if they\n"
+    "share network and IPC with the computer, and run as the same user as its other nodes."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,23 +187,6 @@ def _metadata(installed: Distribution) -> Iterator[tuple[str, bytes]]:
 def _digest(data: bytes) -> str:
     digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
     return f"sha256={digest}"
-
-
-_HEAD = """\
-# Written by 'compose export docker-compose' for the system {system}.
-#
-#   docker compose up --build       docker compose ps       docker compose logs -f
-"""
-_END = """\
-#
-# 'on_failure: shutdown' of the system: let all processes end with the first one that ends.
-#
-#   docker compose up --abort-on-container-exit
-"""
-_HOST = (
-    "ROS nodes of one computer exchange messages by shared memory. Containers do as well if they\n"
-    "share network and IPC with the computer, and run as the same user as its other nodes."
-)
 
 
 def compose_file(

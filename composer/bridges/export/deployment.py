@@ -42,6 +42,11 @@ VARIABLES = (
 )
 _LONGEST_LABEL = 63
 _MEGABYTE = 1_000_000
+#: Begins like a name or a path, so that no parser takes it for a number, and has no syntax in it.
+_PLAIN = re.compile(r"[A-Za-z_/.][A-Za-z0-9_/.+=@-]*\Z")
+_NOT_TEXT = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", ".inf", ".nan", "~"}
+#: A key that stands for a comment; its value is the text.
+_COMMENT = re.compile(r'^( *)"?#\d+"?: (.*)$', re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,13 +199,6 @@ def _labels(names: Iterable[str]) -> list[str]:
             label, number = f"{text}-{number}", number + 1
         found.append(label)
     return found
-
-
-#: Begins like a name or a path, so that no parser takes it for a number, and has no syntax in it.
-_PLAIN = re.compile(r"[A-Za-z_/.][A-Za-z0-9_/.+=@-]*\Z")
-_NOT_TEXT = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", ".inf", ".nan", "~"}
-#: A key that stands for a comment; its value is the text.
-_COMMENT = re.compile(r'^( *)"?#\d+"?: (.*)$', re.MULTILINE)
 
 
 class _Dumper(yaml.SafeDumper):

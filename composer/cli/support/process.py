@@ -35,6 +35,13 @@ _READ_BYTES = 4096
 _MIN_DELAY_S = 0.001
 _LAST_RESORT_S = 1.0
 _LONGEST_LIMIT_S = 1e8  # three years, within the range of C's timers
+#: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
+_ADDRESS_VARIABLE = "COMPOSE_DASHBOARD_FD"
+_DASHBOARD_READY_WITHIN_S = 20.0
+#: The report that a system is up waits this long for the address.
+_ADDRESS_WITHIN_S = 5.0
+_DASHBOARD_ENDS_WITHIN_S = 1.0
+_PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
 
 
 def compose_command() -> tuple[str, ...]:
@@ -195,15 +202,6 @@ def _new_file(path: Path) -> BinaryIO:
         ) from problem
 
 
-#: Holds the file descriptor on which a dashboard reports its address to ``compose run``.
-_VARIABLE = "COMPOSE_DASHBOARD_FD"
-_READY_WITHIN_S = 20.0
-#: The report that a system is up waits this long for the address.
-_ADDRESS_WITHIN_S = 5.0
-_ENDS_WITHIN_S = 1.0
-_PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
-
-
 def require_dashboard(command: str) -> None:
     """Raise CommandError if the packages of the extra ``dashboard`` are not installed."""
     require_extra(command, "dashboard", "starlette", "uvicorn", "websockets")
@@ -227,11 +225,11 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
     Yield a function that returns the lines with the address, for a process in the background: its
     output is a file that others may read, so the address is not printed there.
     """
-    dashboard = ReportingProcess(("dashboard", *arguments), _VARIABLE, subprocess.DEVNULL)
+    dashboard = ReportingProcess(("dashboard", *arguments), _ADDRESS_VARIABLE, subprocess.DEVNULL)
     found: list[str] = []
 
     def announce() -> None:
-        url = dashboard.report(_READY_WITHIN_S)
+        url = dashboard.report(_DASHBOARD_READY_WITHIN_S)
         if url:
             found.append(url)
         if not in_background and not is_ending.is_set():
@@ -251,11 +249,11 @@ def shown_address(arguments: Sequence[str]) -> Iterator[Callable[[], str | None]
         is_ending.set()
         dashboard.process.terminate()
         try:
-            dashboard.process.wait(_ENDS_WITHIN_S)
+            dashboard.process.wait(_DASHBOARD_ENDS_WITHIN_S)
         except subprocess.TimeoutExpired:
             dashboard.process.kill()
             dashboard.process.wait()
-        thread.join(_ENDS_WITHIN_S)
+        thread.join(_DASHBOARD_ENDS_WITHIN_S)
 
 
 def follow_parent() -> int | None:
@@ -263,7 +261,7 @@ def follow_parent() -> int | None:
 
     Return the file descriptor to report the address on; None if a user has started the dashboard.
     """
-    descriptor = os.environ.pop(_VARIABLE, None)
+    descriptor = os.environ.pop(_ADDRESS_VARIABLE, None)
     if descriptor is None:
         return None
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, ctypes.c_ulong(signal.SIGKILL))

@@ -38,6 +38,9 @@ from composer.runtime.process.computer import is_this_computer
 from composer.runtime.process.watchdog import STOP_SIGNALS
 
 _HASH_CHARACTERS = 14  # of RIHS01_ and the digest: enough to compare by eye
+_INVENTORY_WITHIN_S = 30.0
+_MOST_LINES = 12  # of one host and one kind: the reason for hundreds is the first few's
+_LONGEST_NAME = 256  # of a file, for Linux
 
 
 class Kind(Enum):
@@ -95,10 +98,6 @@ def _unlike(
         theirs = there.get(name)
         if ours != theirs:
             yield name, ours, theirs
-
-
-_INVENTORY_WITHIN_S = 30.0
-_MOST_LINES = 12  # of one host and one kind: the reason for hundreds is the first few's
 
 
 class HostsDiffer(Exception):
@@ -189,9 +188,6 @@ def _raise_problems(results: Sequence[object]) -> None:
             raise result
     if problems:
         raise HostsDiffer(problems)
-
-
-_LONGEST_NAME = 256  # of a file, for Linux
 
 
 def question_about(system: System, path: Path, project: Project) -> Question:

@@ -30,6 +30,8 @@ SUBSCRIPTION_DEPTH = 1000
 #: Messages that a command takes at once: they may be large.
 _MAX_TAKEN = 20
 _ACKNOWLEDGED_WITHIN_S = 1
+#: A message has its time already, so it may wait: polling costs less than a wake-up for each.
+_POLL_PERIOD_S = 0.01
 
 
 class NotAcknowledgedError(RosError):
@@ -50,10 +52,6 @@ class Publication:
     rate_hz: float = 1.0
     times: int | None = None
     wait_for: int = 0
-
-
-#: A message has its time already, so it may wait: polling costs less than a wake-up for each.
-_POLL_PERIOD_S = 0.01
 
 
 class TopicSubscription(SampledTopic):

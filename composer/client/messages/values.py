@@ -25,6 +25,11 @@ from composer.runtime.ros.messages import (
     to_plain,
 )
 
+_SLASHES = 2
+_TYPE_HINT = "a type has three parts, such as std_msgs/msg/String"
+#: Builds a message; its expressions see the names of the scope.
+Build = Callable[[Mapping[str, Any]], Any]
+
 
 class _Kind(NamedTuple):
     """The folder of an interface kind, and an attribute that only its classes have."""
@@ -38,11 +43,6 @@ _KINDS = {
     "service": _Kind("srv", "Request"),
     "action": _Kind("action", "Goal"),
 }
-_SLASHES = 2
-_TYPE_HINT = "a type has three parts, such as std_msgs/msg/String"
-
-#: Builds a message; its expressions see the names of the scope.
-Build = Callable[[Mapping[str, Any]], Any]
 
 
 class InvalidValueError(RosError):

@@ -29,6 +29,15 @@ from composer.model.names import is_selected
 MAX_FILE_BYTES = 10 * 1024 * 1024
 MAX_FILES = 5
 _FILE_NAME = re.compile(r"log-(\d{6,12})\.jsonl")
+FOLDER = "compose"
+#: How many runs of a system are kept, with the one that starts.
+MAX_RUNS = 20
+_ABOUT = "run.json"
+_MAX_ABOUT_BYTES = 65_536
+#: The folders of systems: their names, with dots in place of slashes.
+_SYSTEM = re.compile(r"\w+(\.\w+)*", re.ASCII)
+_NAME = re.compile(r"(\d{4}(?:-\d\d){5}-\d{3})-\d+")
+_NAME_FORMAT = "%Y-%m-%d-%H-%M-%S-%f"
 
 
 def log_files(folder: Path) -> list[Path]:
@@ -89,17 +98,6 @@ class RotatingFile:
 
     def _path(self, number: int) -> Path:
         return self._folder / f"log-{number:06}.jsonl"
-
-
-FOLDER = "compose"
-#: How many runs of a system are kept, with the one that starts.
-MAX_RUNS = 20
-_ABOUT = "run.json"
-_MAX_ABOUT_BYTES = 65_536
-#: The folders of systems: their names, with dots in place of slashes.
-_SYSTEM = re.compile(r"\w+(\.\w+)*", re.ASCII)
-_NAME = re.compile(r"(\d{4}(?:-\d\d){5}-\d{3})-\d+")
-_NAME_FORMAT = "%Y-%m-%d-%H-%M-%S-%f"
 
 
 @dataclass(frozen=True, slots=True)

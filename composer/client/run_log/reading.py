@@ -26,6 +26,14 @@ from composer.model.names import PROGRAM_LOGGER, is_selected
 _MICROSECOND_NS = 1000
 _SECOND_NS = 1_000_000_000
 _END_NS = 2**63  # of the times of ROS, in the year 2262
+_EPOCH = datetime.fromtimestamp(0, UTC)
+LEVELS = ("debug", "info", "warn", "error", "fatal")
+_PART = re.compile(r"(\d+(?:\.\d+)?)(ms|s|m|h|d)")
+_UNITS_S = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
+_MAX_LINE_BYTES = 1_000_000
+_POLL_S = 0.1
+#: What a process says about states, the one that coordinates it says as well.
+_INFO = "info"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +87,6 @@ def parse_line(line: bytes) -> Record | None:
     return Record(time_ns=time_ns, message=message, **safe)
 
 
-_EPOCH = datetime.fromtimestamp(0, UTC)
-
-
-LEVELS = ("debug", "info", "warn", "error", "fatal")
-_PART = re.compile(r"(\d+(?:\.\d+)?)(ms|s|m|h|d)")
-_UNITS_S = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
-
-
 @dataclass(frozen=True, slots=True)
 class Selection:
     """Selects records by their node, time and level.
@@ -133,9 +133,6 @@ def parse_since(text: str, now: datetime) -> int | None:
 def _rank(level: str) -> int:
     """Return the rank of a level; an unknown one is shown in any case."""
     return LEVELS.index(level) if level in LEVELS else len(LEVELS)
-
-
-_MAX_LINE_BYTES = 1_000_000
 
 
 class RunReader:
@@ -195,11 +192,6 @@ def last_records(run: Run, max_bytes: int) -> list[Record]:
         if not max_bytes:
             break
     return [record for line in lines if (record := parse_line(line)) is not None]
-
-
-_POLL_S = 0.1
-#: What a process says about states, the one that coordinates it says as well.
-_INFO = "info"
 
 
 class SystemLog:

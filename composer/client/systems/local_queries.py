@@ -40,6 +40,13 @@ from composer.runtime.protocol.requests import (
 
 #: None stands for a system that did not respond.
 AnyReport = TypeVar("AnyReport", SystemReport, SystemReport | None)
+#: Longer than a manager waits for its view to become complete.
+RESPONSE_S = 0.6
+#: The endpoints of the largest systems: discovering the graph takes longer.
+ENDPOINTS_S = 1.0
+_STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
+_LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
+_MANAGER_SERVICE = "/manager/is_active"
 
 
 def parse_state(name: str, text: str) -> SystemReport:
@@ -95,15 +102,6 @@ def with_callbacks_of_processes(reports: Mapping[str, SystemReport]) -> dict[str
         }
         found[name] = with_processes(report, known)
     return found
-
-
-#: Longer than a manager waits for its view to become complete.
-RESPONSE_S = 0.6
-#: The endpoints of the largest systems: discovering the graph takes longer.
-ENDPOINTS_S = 1.0
-_STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
-_LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
-_MANAGER_SERVICE = "/manager/is_active"
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,6 +36,7 @@ IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 _MAX_COMPRESSED = 4 * 1024 * 1024
 _MAX_WIDTH = 1920
 _FORMATS = {b"\xff\xd8": "jpeg", b"\x89P": "png"}
+_MAX_HISTORY = 1000
 
 
 class EchoFeed(Feed):
@@ -199,9 +200,6 @@ def _compressed(message: Any) -> tuple[dict[str, Any], bytes]:
             f" format '{message.format:.40}', {len(data)} bytes",
         )
     return {"encoding": encoding, "source_encoding": message.format}, data
-
-
-_MAX_HISTORY = 1000
 
 
 class LogFeed(Feed):

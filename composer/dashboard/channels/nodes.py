@@ -42,6 +42,12 @@ _SHOWN = (
     *("depends_on", "process", "host", "pid"),
 )
 _MS = 1e3
+_EVENTS = "/parameter_events"
+_EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
+#: Events that may wait.
+_MAX_EVENTS = 1000
+_READ_PERIOD_S = 2.0
+_READ_WITHIN_S = 3.0
 
 
 class NodesFeed(Feed):
@@ -227,14 +233,6 @@ def _callback(item: CallbackRates) -> dict[str, Any]:
             for bound_s, count in parse_buckets(item.figures.histogram)
         ],
     }
-
-
-_EVENTS = "/parameter_events"
-_EVENTS_TYPE = "rcl_interfaces/msg/ParameterEvent"
-#: Events that may wait.
-_MAX_EVENTS = 1000
-_READ_PERIOD_S = 2.0
-_READ_WITHIN_S = 3.0
 
 
 class ParametersFeed(Feed):

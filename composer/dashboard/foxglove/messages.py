@@ -28,6 +28,18 @@ if TYPE_CHECKING:
     from composer.client.shared_session import SampledTopic
     from composer.dashboard.observing.topics import TopicReader
 
+#: Of one client.
+_MAX_SUBSCRIPTIONS = 1000
+_MAX_CHANNELS = 100
+_MAX_ITEMS = 10_000
+#: Messages of a client that wait to be published.
+_MAX_WAITING = 256
+_SKIPPED = "there are more bytes than the dashboard reads of one topic"
+_DEPTH = 200
+_POLL_S = 0.02
+_CLOCK_S = 0.05
+_CLOCK_PROFILE = QosProfile(depth=1, reliability=Reliability.BEST_EFFORT)
+
 
 class Link(Client):
     """The connection of one client of the protocol, without what it requests."""
@@ -73,19 +85,6 @@ class Link(Client):
 def error_text(error: RequestError | Any) -> str:
     """Return an error with its hint."""
     return f"{error} ({error.hint})" if error.hint else str(error)
-
-
-#: Of one client.
-_MAX_SUBSCRIPTIONS = 1000
-_MAX_CHANNELS = 100
-_MAX_ITEMS = 10_000
-#: Messages of a client that wait to be published.
-_MAX_WAITING = 256
-_SKIPPED = "there are more bytes than the dashboard reads of one topic"
-_DEPTH = 200
-_POLL_S = 0.02
-_CLOCK_S = 0.05
-_CLOCK_PROFILE = QosProfile(depth=1, reliability=Reliability.BEST_EFFORT)
 
 
 class TopicFeed(Feed):

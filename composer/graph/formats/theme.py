@@ -31,6 +31,22 @@ _KINDS = {
     "transition": (("none", "#475569"), ("none", "#94a3b8")),
     "transform": (("none", "#a16207"), ("none", "#facc15")),
 }
+#: Everything about a picture but its colors.
+FORMS = (
+    'text{font-family:"Helvetica Neue",Helvetica,Arial,"Liberation Sans",sans-serif;'
+    "font-size:12px;text-anchor:middle}"
+    ".title{font-size:14px;font-weight:600;text-anchor:start}"
+    ".faint,.edge-label,.row-end{font-size:10px}"
+    ".row{text-anchor:start}"
+    ".row-end{text-anchor:end}"
+    ".frame-label{font-size:10px;text-anchor:start}"
+    ".frame{stroke-width:1}"
+    ".shape{stroke-width:1.2}"
+    ".shape.port{stroke-width:.8}"
+    ".edge{fill:none;stroke-width:1.3}"
+    ".edge.service,.edge.implied{stroke-dasharray:5 3}"
+    ".edge.action{stroke-width:2.2}"
+)
 
 
 def colors(*, dark: bool) -> dict[str, str]:
@@ -65,23 +81,6 @@ def color_rules(color: Mapping[str, str]) -> str:
         rules.append(f".head.{mark}{{fill:{color[mark]}}}")
     return "".join(rules)
 
-
-#: Everything about a picture but its colors.
-FORMS = (
-    'text{font-family:"Helvetica Neue",Helvetica,Arial,"Liberation Sans",sans-serif;'
-    "font-size:12px;text-anchor:middle}"
-    ".title{font-size:14px;font-weight:600;text-anchor:start}"
-    ".faint,.edge-label,.row-end{font-size:10px}"
-    ".row{text-anchor:start}"
-    ".row-end{text-anchor:end}"
-    ".frame-label{font-size:10px;text-anchor:start}"
-    ".frame{stroke-width:1}"
-    ".shape{stroke-width:1.2}"
-    ".shape.port{stroke-width:.8}"
-    ".edge{fill:none;stroke-width:1.3}"
-    ".edge.service,.edge.implied{stroke-dasharray:5 3}"
-    ".edge.action{stroke-width:2.2}"
-)
 
 #: The style sheet of a picture that stands alone.
 STYLE = (

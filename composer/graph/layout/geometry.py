@@ -22,6 +22,14 @@ _PADDING, _PADDING_ABOVE = 14.0, 8.0
 _ROW_GAP = 16.0
 #: Shapes whose ends are not straight.
 _SLANTED = (VertexKind.SERVICE, VertexKind.TOPIC, VertexKind.FRAME)
+#: Widths of Helvetica in thousandths of the font size (Adobe font metrics), by character.
+_NARROW = dict.fromkeys("fijlt.,:;!|'`Iƒ/\\[]() ", 300) | dict.fromkeys("ijl'|", 230)
+_WIDE = dict.fromkeys("mwMW%@", 900) | dict.fromkeys("ABCDEGHKNOPQRSTUVXYZ&", 710)
+_WIDTHS = _NARROW | _WIDE
+_USUAL = 560
+_FULL = 1000
+#: Extra width so that estimates for Helvetica fit wider fonts such as DejaVu Sans too.
+_SAFETY = 1.14
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,17 +206,6 @@ def _block_size(cluster: Cluster, ports: list[Vertex]) -> Size:
     head = text_width(cluster.label, FONT_SIZE) + 2 * _PADDING
     widest = max(_row_size(port).width for port in ports)
     return Size(round(max(head, widest)), HEAD_HEIGHT + len(ports) * ROW_HEIGHT)
-
-
-#: Widths of Helvetica in thousandths of the font size (Adobe font metrics), by character.
-_NARROW = dict.fromkeys("fijlt.,:;!|'`Iƒ/\\[]() ", 300) | dict.fromkeys("ijl'|", 230)
-_WIDE = dict.fromkeys("mwMW%@", 900) | dict.fromkeys("ABCDEGHKNOPQRSTUVXYZ&", 710)
-_WIDTHS = _NARROW | _WIDE
-_USUAL = 560
-_FULL = 1000
-
-#: Extra width so that estimates for Helvetica fit wider fonts such as DejaVu Sans too.
-_SAFETY = 1.14
 
 
 def text_width(text: str, size: float) -> float:

@@ -35,6 +35,9 @@ from composer.language.tree import Mapping, Scalar, ScalarValue, Tree, describe
 #: Larger files are systems, which are parsed once anyway.
 _MAX_CACHED_BYTES = 32_768
 _FIRST_KEY_HINT = "begin with 'system: <name>' or 'node: <name>'"
+_LONGEST_PATH = 4096  # PATH_MAX of Linux
+_ENTRIES_FOR_HINT = 1000
+_WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
 
 def read_document(
@@ -156,11 +159,6 @@ def _root(
         if isinstance(tree, Scalar) and ":" in str(tree.value):
             hint = "put a space after the colon"
     return None, [*diagnostics, Diagnostic(YAML_SYNTAX, message, span, hint=hint or first_key_hint)]
-
-
-_LONGEST_PATH = 4096  # PATH_MAX of Linux
-_ENTRIES_FOR_HINT = 1000
-_WIDE_ENCODINGS = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16"}
 
 
 def read_bytes(path: Path, source: SourceFile) -> tuple[bytes, list[Diagnostic]]:

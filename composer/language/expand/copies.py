@@ -37,6 +37,19 @@ from composer.language.tree import (
 
 CONDITIONS = ("if", "unless")
 _WHOLE = re.compile(r"\$\{([^{}]*)\}")
+FOR_EACH = "for_each"
+_DIFFERENT = "give 'for_each' values that make the names different"
+_DEPTH = 2  # of the entries of a section
+#: The sections of a system whose entries can have copies and conditions, and what an entry is.
+SECTIONS: Map[str, str] = {
+    "include": "include",
+    "nodes": "node",
+    "connections": "connection",
+    "executors": "executor",
+    "processes": "process",
+    "hosts": "host",
+    "chains": "chain",
+}
 
 
 def without_conditions(tree: Tree) -> Tree:
@@ -120,22 +133,6 @@ def _evaluated(source: str, start: int, written: Scalar, substitution: Substitut
 
 def _report(substitution: Substitution, span: Span, message: str, hint: str | None = None) -> None:
     substitution.diagnostics.append(Diagnostic(rules.MALFORMED_VARIABLE, message, span, hint=hint))
-
-
-FOR_EACH = "for_each"
-
-_DIFFERENT = "give 'for_each' values that make the names different"
-_DEPTH = 2  # of the entries of a section
-#: The sections of a system whose entries can have copies and conditions, and what an entry is.
-SECTIONS: Map[str, str] = {
-    "include": "include",
-    "nodes": "node",
-    "connections": "connection",
-    "executors": "executor",
-    "processes": "process",
-    "hosts": "host",
-    "chains": "chain",
-}
 
 
 def expand_section(

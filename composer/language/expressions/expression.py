@@ -19,6 +19,16 @@ from typing import Any, TypeAlias, cast
 from composer.base.diagnostics import shown
 from composer.base.fast_dataclass import dataclass
 
+_REASONS: Mapping[type[Exception], str] = {
+    KeyError: "there is no such name here",
+    ZeroDivisionError: "division by zero",
+    OverflowError: "the number is too large",
+    TypeError: "a string and a number have no order",
+    ValueError: "not defined for this value",
+}
+#: Returns the value of an expression with the names in a scope.
+Function: TypeAlias = Callable[[Mapping[str, Any]], Any]
+
 
 class ExpressionError(Exception):
     """The text is not a valid expression.
@@ -164,19 +174,6 @@ def _read_index(value: Any, index: int) -> Any:
     if not -len(value) <= index < len(value):
         raise Refusal(f"there is no element {index} in a list of {len(value)}")
     return plain(value[index])
-
-
-_REASONS: Mapping[type[Exception], str] = {
-    KeyError: "there is no such name here",
-    ZeroDivisionError: "division by zero",
-    OverflowError: "the number is too large",
-    TypeError: "a string and a number have no order",
-    ValueError: "not defined for this value",
-}
-
-
-#: Returns the value of an expression with the names in a scope.
-Function: TypeAlias = Callable[[Mapping[str, Any]], Any]
 
 
 def _is_name(part: str | int) -> bool:

@@ -18,6 +18,7 @@ _MAXIMUM_DIGITS = 15
 _PLAIN_NUMBERS = frozenset((int, float))
 _PLAIN_COMPARABLE = frozenset((int, float, bool, str, type(None)))
 _PRIMITIVES = (Kind.NUMBER, Kind.TEXT, Kind.BOOL)
+CONSTANTS: Mapping[str, float | bool] = {"pi": math.pi, "true": True, "false": False}
 
 
 def as_number(value: Any) -> Any:
@@ -161,8 +162,6 @@ class Function:
         """Return whether the function takes ``count`` arguments."""
         return self.least <= count and (self.most is None or count <= self.most)
 
-
-CONSTANTS: Mapping[str, float | bool] = {"pi": math.pi, "true": True, "false": False}
 
 FUNCTIONS: Mapping[str, Function] = {
     "abs": Function(_of_number(abs)),

@@ -35,6 +35,7 @@ _ENDS = {
 }
 
 _WORDS_FOR_NOTHING = ("null", "~")
+_LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
 
 
 @dataclass(slots=True)
@@ -295,9 +296,6 @@ def _no_word_of(error: _LocatedError, words: list[str]) -> Iterator[Diagnostic]:
     hint = suggestion(error.instance, words, limit=0) if isinstance(error.instance, str) else None
     hint = hint or value_advice(error.path, error.instance)
     yield Diagnostic(rules.UNKNOWN_WORD, message, error.value_span, hint=hint)
-
-
-_LIMITS = {"minimum": "at least", "maximum": "at most", "exclusiveMinimum": "a number above"}
 
 
 def _out_of_range(error: _LocatedError, _: _MisspelledKeys) -> Iterator[Diagnostic]:

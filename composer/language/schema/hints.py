@@ -105,6 +105,18 @@ EXAMPLES = {
     ("feedback", "period_ms"): "100",
     ("system", "nodes"): "{talker: {type: timer_source}}",
 }
+_SUBSTITUTION = r"\$\{"
+_EXPRESSION = r"\{"
+_WORDS = {
+    "object": "a map",
+    "array": "a list",
+    "string": "a string",
+    "number": "a number",
+    "integer": "an integer",
+    "boolean": "true or false",
+    "null": "null",
+}
+_WORDS_FOR_TRUTH = frozenset({"yes", "no", "on", "off"})
 
 
 def intended_key(name: str, valid: Iterable[str]) -> str | None:
@@ -151,20 +163,6 @@ def value_advice(path: Sequence[str | int], value: object) -> str | None:
     if key == "namespace" and isinstance(value, list) and value:
         return f"write '{'/'.join(map(str, value))}'"
     return None
-
-
-_SUBSTITUTION = r"\$\{"
-_EXPRESSION = r"\{"
-_WORDS = {
-    "object": "a map",
-    "array": "a list",
-    "string": "a string",
-    "number": "a number",
-    "integer": "an integer",
-    "boolean": "true or false",
-    "null": "null",
-}
-_WORDS_FOR_TRUTH = frozenset({"yes", "no", "on", "off"})
 
 
 def expected(schema: dict[str, Any]) -> str:

@@ -23,6 +23,21 @@ _Resolved: TypeAlias = tuple[dict[str, Any], _Checks, bool]
 
 _DEFINITIONS = "#/definitions/"
 _compiled = cache(re.compile)
+#: Unlike in JSON Schema, 10.0 is not an integer: it is none in ROS.
+_PYTHON_TYPES: dict[str, frozenset[type]] = {
+    "object": frozenset({dict}),
+    "array": frozenset({list}),
+    "string": frozenset({str}),
+    "number": frozenset({int, float}),
+    "integer": frozenset({int}),
+    "boolean": frozenset({bool}),
+    "null": frozenset({type(None)}),
+}
+_NUMBERS = _PYTHON_TYPES["number"]
+#: Keywords that only describe, or that belong to another keyword.
+_IGNORED = frozenset(
+    {"$schema", "title", "description", "default", "examples", "definitions", "then", "else"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,29 +134,12 @@ class _Validator:
         yield from self.errors(value, schema.get(branch, {}), path)
 
 
-#: Unlike in JSON Schema, 10.0 is not an integer: it is none in ROS.
-_PYTHON_TYPES: dict[str, frozenset[type]] = {
-    "object": frozenset({dict}),
-    "array": frozenset({list}),
-    "string": frozenset({str}),
-    "number": frozenset({int, float}),
-    "integer": frozenset({int}),
-    "boolean": frozenset({bool}),
-    "null": frozenset({type(None)}),
-}
-_NUMBERS = _PYTHON_TYPES["number"]
-
-
 def _has_type(_: _Validator, value: Any, required: str | list[str]) -> bool:
     if isinstance(required, str):
         return type(value) in _PYTHON_TYPES[required]
     return any(type(value) in _PYTHON_TYPES[name] for name in required)
 
 
-#: Keywords that only describe, or that belong to another keyword.
-_IGNORED = frozenset(
-    {"$schema", "title", "description", "default", "examples", "definitions", "then", "else"}
-)
 #: Keywords whose errors are those of inner values, or of other schemas of the same value.
 _INNER: dict[str, Callable[[_Validator, Any, dict[str, Any], Path], Iterator[SchemaError]]] = {
     "properties": _Validator.properties,

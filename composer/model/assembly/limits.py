@@ -23,6 +23,7 @@ from composer.language.rules import (
 INVALID_INCLUDE = error("RC290", "invalid-include")
 UNKNOWN_OVERRIDE = error("RC293", "unknown-override")
 UNKNOWN_BASE = error("RC295", "unknown-base")
+_SPLIT = "split the system, or declare repeated nodes once as a node type"
 
 
 def exceeded(message: str, span: Span, hint: str) -> Stopped:
@@ -36,7 +37,6 @@ class _Limit(NamedTuple):
     hint: str
 
 
-_SPLIT = "split the system, or declare repeated nodes once as a node type"
 _LIMITS: Map[str, _Limit] = {
     "includes": _Limit(
         MAX_INCLUDES,

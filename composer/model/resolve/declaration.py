@@ -55,6 +55,16 @@ from composer.model.resolve.qos import QosTable
 from composer.model.resolve.transforms import merged_transforms, read_transforms
 from composer.project.node_types import SourceFolders
 
+#: Compiling and checking an expression takes the time of this many values, and of one more for a
+#: few of its characters.
+_VALUES_PER_EXPRESSION = 20
+_CHARACTERS_PER_VALUE = 2
+_REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
+_REPLACED_KEYS = ("description", "only_declared", *(name for name, _ in NODE_EVENTS))
+_OVERLAID_KEYS = ("state", "arguments", "executable", "component")
+_TRANSFORMS = "transforms"
+_PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
+
 
 @dataclass(frozen=True, slots=True)
 class Implementation:
@@ -203,12 +213,6 @@ def declare(
     )
 
 
-#: Compiling and checking an expression takes the time of this many values, and of one more for a
-#: few of its characters.
-_VALUES_PER_EXPRESSION = 20
-_CHARACTERS_PER_VALUE = 2
-
-
 def _size(tree: Tree, name: str = "") -> int:
     """Return the number of keys and values under the key ``name``."""
     match tree:
@@ -220,13 +224,6 @@ def _size(tree: Tree, name: str = "") -> int:
             return _VALUES_PER_EXPRESSION + len(text) // _CHARACTERS_PER_VALUE
         case _:
             return 1
-
-
-_REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
-_REPLACED_KEYS = ("description", "only_declared", *(name for name, _ in NODE_EVENTS))
-_OVERLAID_KEYS = ("state", "arguments", "executable", "component")
-_TRANSFORMS = "transforms"
-_PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
 
 
 def refines(instance: Mapping) -> bool:

@@ -66,6 +66,8 @@ from composer.model.resolve.parameters import GivenValues, node_parameters
 from composer.model.resolve.qos import QosTable
 from composer.project.node_types import SourceFolders
 
+_NOTHING = Declaration("", Implementation(), (), (), (), (), ())
+
 
 @dataclass(frozen=True, slots=True)
 class SystemContext:
@@ -97,9 +99,6 @@ class _Declared:
     complete: bool = True
     type_files: tuple[Path, ...] = ()
     own_type_name: Located[str] | None = None
-
-
-_NOTHING = Declaration("", Implementation(), (), (), (), (), ())
 
 
 def resolve_node(entry: Entry, context: SystemContext) -> Node:

@@ -31,6 +31,8 @@ from composer.model import (
 )
 from composer.model.names import join
 
+_INTROSPECTION = frozenset(field.name for field in fields(Introspection))
+
 
 @dataclass(frozen=True, slots=True)
 class NodeNames:
@@ -132,9 +134,6 @@ def _watch(tree: Tree | None, default: Watch) -> Watch:
         callback_ms=number(tree.get("callback_ms")) or default.callback_ms,
         max_errors=integer(tree.get("max_errors")) or default.max_errors,
     )
-
-
-_INTROSPECTION = frozenset(field.name for field in fields(Introspection))
 
 
 def read_introspection(*layers: Tree | None) -> Introspection:

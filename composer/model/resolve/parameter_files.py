@@ -42,6 +42,13 @@ __all__ = ["PARAMETER_FILES", "ParameterFiles", "read_parameter_file", "read_par
 
 #: The values of all parameter files, of which some may be missing.
 PARAMETER_FILES: Subject = ("parameter files", "")
+PARAMETER_FILE = error("RC043", "parameter-file")
+DUPLICATE_PARAMETER = warning("RC046", "duplicate-parameter")
+PARAMETER_SUBSTITUTION = warning("RC045", "parameter-substitution")
+PARAMETERS = "ros__parameters"
+_MISSPELLED = ("parameters", "params", "ros_params", "ros__params", "ros_parameters")
+_SUBSTITUTION = re.compile(r"\$\([a-z][a-z0-9_-]*(?: [^)]*)?\)|\$\{[^}]*\}")
+_TYPES: dict[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
 
 
 def read_parameter_files(
@@ -67,16 +74,6 @@ def read_parameter_files(
             for item in found
         )
     return files
-
-
-PARAMETER_FILE = error("RC043", "parameter-file")
-DUPLICATE_PARAMETER = warning("RC046", "duplicate-parameter")
-PARAMETER_SUBSTITUTION = warning("RC045", "parameter-substitution")
-
-PARAMETERS = "ros__parameters"
-_MISSPELLED = ("parameters", "params", "ros_params", "ros__params", "ros_parameters")
-_SUBSTITUTION = re.compile(r"\$\([a-z][a-z0-9_-]*(?: [^)]*)?\)|\$\{[^}]*\}")
-_TYPES: dict[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
 
 
 def read_parameter_file(

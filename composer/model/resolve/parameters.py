@@ -39,6 +39,9 @@ from composer.model.resolve.parameter_files import ParameterFiles
 #: The type of a parameter whose bare value has no clear type, such as an empty list.
 UNKNOWN_TYPE = ""
 _USE_SIM_TIME_DESCRIPTION = "Whether the node uses the time of /clock."
+_SCALAR_TYPES: Map[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
+#: Names that match every node. rcl joins sections of the same name, at the place of the first.
+_FIRST_FOR_ALL, _LAST_FOR_ALL = "/**/*", "/*/**"
 
 
 def read_parameters(tree: Tree | None) -> tuple[Parameter, ...]:
@@ -130,9 +133,6 @@ def promoted(value: Plain, kind: str) -> Plain:
     return value
 
 
-_SCALAR_TYPES: Map[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
-
-
 def _is_whole(value: Plain) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
@@ -190,10 +190,6 @@ def _value(tree: Tree | None, kind: str) -> Located[Plain] | None:
 
 def _choices(tree: Sequence, kind: str) -> Located[tuple[Plain, ...]]:
     return Located(tuple(promoted(plain(item), kind) for item in tree.items), tree.span)
-
-
-#: Names that match every node. rcl joins sections of the same name, at the place of the first.
-_FIRST_FOR_ALL, _LAST_FOR_ALL = "/**/*", "/*/**"
 
 
 @dataclass(frozen=True, slots=True)

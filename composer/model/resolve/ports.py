@@ -57,6 +57,33 @@ NODE_EVENTS = (
     ("on_deactivate", Event.DEACTIVATE),
     ("on_cleanup", Event.CLEANUP),
 )
+Events = tuple[tuple[Event, Reaction], ...]
+_SECTIONS = tuple((kind, kind.section) for kind in PortKind)
+_CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
+_INLINE_EVENTS = {
+    PortKind.SUBSCRIPTION: Event.MESSAGE,
+    PortKind.SERVICE: Event.REQUEST,
+    PortKind.ACTION_SERVER: Event.GOAL,
+}
+_NESTED_EVENTS = {
+    PortKind.CLIENT: (("on_response", Event.RESPONSE), ("on_failure", Event.FAILURE)),
+    PortKind.ACTION_CLIENT: (
+        ("on_feedback", Event.FEEDBACK),
+        ("on_result", Event.RESULT),
+        ("on_failure", Event.FAILURE),
+    ),
+}
+_IS_SET = partial(flag, default=False)
+#: The keys of ports of all kinds, and how to read them.
+_SETTINGS: Map[str, Callable[[Tree], Any]] = {
+    "result_timeout_ms": number,
+    "budget_ms": number,
+    "reentrant": _IS_SET,
+    "always_on": _IS_SET,
+    "external": _IS_SET,
+    "required": partial(flag, default=None),
+    "description": plain_text,
+}
 
 
 def expression(tree: Tree | None, diagnostics: list[Diagnostic]) -> Located[Expression] | None:
@@ -108,9 +135,6 @@ def nested(entry: Entry | None, event: Event, diagnostics: list[Diagnostic]) -> 
     return ((event, found),) if found is not None else ()
 
 
-Events = tuple[tuple[Event, Reaction], ...]
-
-
 def node_reactions(tree: Mapping, diagnostics: list[Diagnostic]) -> Events:
     """Return the reactions of a node to its transitions."""
     return tuple(
@@ -136,23 +160,6 @@ def _log(tree: Tree | None, diagnostics: list[Diagnostic]) -> tuple[Template | N
         return template(tree, diagnostics), LogLevel.INFO
     level = value_or(choice(tree.get("level"), LogLevel), LogLevel.INFO)
     return template(tree.get("message"), diagnostics), level
-
-
-_SECTIONS = tuple((kind, kind.section) for kind in PortKind)
-_CLIENTS = frozenset({PortKind.CLIENT, PortKind.ACTION_CLIENT})
-_INLINE_EVENTS = {
-    PortKind.SUBSCRIPTION: Event.MESSAGE,
-    PortKind.SERVICE: Event.REQUEST,
-    PortKind.ACTION_SERVER: Event.GOAL,
-}
-_NESTED_EVENTS = {
-    PortKind.CLIENT: (("on_response", Event.RESPONSE), ("on_failure", Event.FAILURE)),
-    PortKind.ACTION_CLIENT: (
-        ("on_feedback", Event.FEEDBACK),
-        ("on_result", Event.RESULT),
-        ("on_failure", Event.FAILURE),
-    ),
-}
 
 
 def read_ports(node: Mapping, qos: QosTable, diagnostics: list[Diagnostic]) -> tuple[Port, ...]:
@@ -199,19 +206,6 @@ def _port(
         isolation=value_or(choice(tree.get("isolation"), Isolation), isolation),
         **_settings(tree),
     )
-
-
-_IS_SET = partial(flag, default=False)
-#: The keys of ports of all kinds, and how to read them.
-_SETTINGS: Map[str, Callable[[Tree], Any]] = {
-    "result_timeout_ms": number,
-    "budget_ms": number,
-    "reentrant": _IS_SET,
-    "always_on": _IS_SET,
-    "external": _IS_SET,
-    "required": partial(flag, default=None),
-    "description": plain_text,
-}
 
 
 def _settings(tree: Mapping) -> dict[str, Any]:

@@ -26,6 +26,8 @@ from composer.language.tree import (
 from composer.model import ChannelKind, NamedQos, Qos, QosReference
 from composer.model.qos import DURATIONS, PRESETS, WORDS, QosProfile
 
+PolicyReader = Callable[[Tree], "Located[Any] | None"]
+
 
 @dataclass(slots=True)
 class QosTable:
@@ -141,9 +143,6 @@ def _overlaid(tree: Tree, base: Qos, span: Span) -> Qos:
             known = False
     profile = replace(base.profile, **changes)
     return Qos(profile, span, explicit=True, policy_spans=tuple(spans.items()), known=known)
-
-
-PolicyReader = Callable[[Tree], "Located[Any] | None"]
 
 
 def _duration(tree: Tree) -> Located[Any] | None:

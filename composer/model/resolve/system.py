@@ -57,6 +57,11 @@ from composer.model.resolve.qos import qos_table
 from composer.model.system import Recording
 from composer.project.node_types import SourceFolders
 
+ROOT = "/"
+DEFAULT_THREADS = 2
+#: Keys of the file of a node type that its nodes do not have.
+_NOT_OF_NODES = frozenset(("node", "variables", "extends", "type"))
+
 
 def processes_of_nodes(processes: Iterable[Process]) -> Map[str, Located[str]]:
     """Return the process of each node that a process names; the first one that does."""
@@ -133,12 +138,6 @@ def read_recording(entry: Entry | None) -> Recording | None:
         split_mb=value_or(number(tree.get("split_mb")), None),
         split_s=value_or(number(tree.get("split_s")), None),
     )
-
-
-ROOT = "/"
-DEFAULT_THREADS = 2
-#: Keys of the file of a node type that its nodes do not have.
-_NOT_OF_NODES = frozenset(("node", "variables", "extends", "type"))
 
 
 def resolve_system(

@@ -44,6 +44,8 @@ _TOOL_TOPICS = {
     "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
 }
 _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
+#: The last name of the manager of a running system, and a service that every manager has.
+MANAGER, _MANAGER_SERVICE = "manager", ("is_active", "std_srvs/srv/Trigger")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +71,6 @@ class ObservedEndpoint:
             known = _TOOL_TOPICS.get(self.name) == self.type
             return known or (last == "transition_event" and self.type == _TRANSITION_EVENT)
         return False
-
-
-#: The last name of the manager of a running system, and a service that every manager has.
-MANAGER, _MANAGER_SERVICE = "manager", ("is_active", "std_srvs/srv/Trigger")
 
 
 def is_manager(node: str, endpoints: Iterable[ObservedEndpoint]) -> bool:

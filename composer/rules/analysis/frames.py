@@ -40,6 +40,10 @@ _METHODS: Mapping[str, tuple[tuple[int, str], ...]] = {
     "transform": ((1, "target"),),
     BROADCAST: ((0, "child"),),
 }
+_STATIC_SUFFIX = "_static"
+#: Maximum number of similar names to consider, because the name itself is among them.
+_MAXIMUM_CANDIDATES = 5
+Declared: TypeAlias = StaticTransform | DynamicTransform
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +89,6 @@ def _dotted_name(expression: ast.expr, scope: Scope) -> str:
     """Return the dotted name that an expression stands for; "" if there is none."""
     value = scope.known(scope.followed, expression)
     return dotted(value) if value is not None else ""
-
-
-_STATIC_SUFFIX = "_static"
-#: Maximum number of similar names to consider, because the name itself is among them.
-_MAXIMUM_CANDIDATES = 5
-
-Declared: TypeAlias = StaticTransform | DynamicTransform
 
 
 @dataclass(frozen=True, slots=True)

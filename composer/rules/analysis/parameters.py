@@ -12,6 +12,23 @@ from composer.language.tree import Plain
 from composer.model import Parameter, ParameterType
 from composer.rules.analysis.context import Context, is_unresolved, location
 
+_INTEGERS = (-(2**63), 2**63 - 1)
+_BYTES = (0, 255)
+_LIMITS = {
+    "byte": "0 to 255",
+    **dict.fromkeys(("integer", "double"), "the range of signed 64-bit integers"),
+}
+#: Tolerance for a whole number of steps, in steps.
+_TOLERANCE = 1e-6
+_ELEMENTS = {
+    ParameterType.BYTE_ARRAY: "byte",
+    ParameterType.BOOL_ARRAY: "bool",
+    ParameterType.INTEGER_ARRAY: "integer",
+    ParameterType.DOUBLE_ARRAY: "double",
+    ParameterType.STRING_ARRAY: "string",
+}
+KNOWN_TYPES = frozenset(kind.value for kind in ParameterType)
+
 
 def known_values(context: Context) -> Iterator[tuple[Parameter, Located[Plain]]]:
     """Yield every default and every set value of the parameters with a known type.
@@ -90,33 +107,12 @@ def _is_unresolved_value(value: Plain) -> bool:
     return any(isinstance(item, str) and is_unresolved(item) for item in items)
 
 
-_INTEGERS = (-(2**63), 2**63 - 1)
-_BYTES = (0, 255)
-_LIMITS = {
-    "byte": "0 to 255",
-    **dict.fromkeys(("integer", "double"), "the range of signed 64-bit integers"),
-}
-#: Tolerance for a whole number of steps, in steps.
-_TOLERANCE = 1e-6
-
-_ELEMENTS = {
-    ParameterType.BYTE_ARRAY: "byte",
-    ParameterType.BOOL_ARRAY: "bool",
-    ParameterType.INTEGER_ARRAY: "integer",
-    ParameterType.DOUBLE_ARRAY: "double",
-    ParameterType.STRING_ARRAY: "string",
-}
-
-
 @dataclass(frozen=True, slots=True)
 class RangeProblem:
     """A number outside its range, and the limit that it violates."""
 
     message: str
     limit: Located[float]
-
-
-KNOWN_TYPES = frozenset(kind.value for kind in ParameterType)
 
 
 def type_problem(value: Plain, kind: str) -> str | None:

@@ -62,6 +62,9 @@ _MANY = 3
 _MAX_UNKNOWN = 20  # further unknown names in the labels of one diagnostic
 _MAX_PLACES = 3  # further uses in the labels of one diagnostic
 _SEVERITIES = tuple(Severity)  # the most severe one first
+PORT_SECTIONS = tuple(kind.section for kind in PortKind)
+SECTIONS = (*PORT_SECTIONS, "parameters", "state", "timers", "transforms")
+_NEARBY_LINES = 8
 
 
 def unknown_subjects(kind: str, name: str, names: Iterable[str]) -> tuple[Subject, ...]:
@@ -200,12 +203,6 @@ def _with_one_of_many(found: list[Diagnostic]) -> list[Diagnostic]:
             )
             first[id(item)] = replace(item, related=(*item.related, *labels))
     return [first.get(id(item), item) for item in found if id(item) not in left_out]
-
-
-PORT_SECTIONS = tuple(kind.section for kind in PortKind)
-SECTIONS = (*PORT_SECTIONS, "parameters", "state", "timers", "transforms")
-
-_NEARBY_LINES = 8
 
 
 @dataclass(frozen=True, slots=True)

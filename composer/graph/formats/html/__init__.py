@@ -37,6 +37,20 @@ _SEPARATOR = " -> "
 _WHOLE = ("node", "topic", "service", "action")
 
 Facts = Mapping[str, Plain]
+#: The modules of the script, each before those that import it.
+_SCRIPTS = (
+    "picture.js",
+    "viewport.js",
+    "filter.js",
+    "search.js",
+    "selection.js",
+    "tabs.js",
+    "appearance.js",
+    "main.js",
+)
+#: What modules have and scripts do not.
+_MODULE_SYNTAX = re.compile(r"^(import .*\n+|export )", re.MULTILINE)
+_KINDS = (VertexKind.NODE, VertexKind.TOPIC, VertexKind.SERVICE, VertexKind.ACTION)
 
 
 def articles(graphs: Iterable[Graph]) -> Iterator[str]:
@@ -174,22 +188,6 @@ def _scalar(value: Plain) -> str:
 
 def _words(name: str) -> str:
     return _WORDS.get(name, name.replace("_", " "))
-
-
-#: The modules of the script, each before those that import it.
-_SCRIPTS = (
-    "picture.js",
-    "viewport.js",
-    "filter.js",
-    "search.js",
-    "selection.js",
-    "tabs.js",
-    "appearance.js",
-    "main.js",
-)
-#: What modules have and scripts do not.
-_MODULE_SYNTAX = re.compile(r"^(import .*\n+|export )", re.MULTILINE)
-_KINDS = (VertexKind.NODE, VertexKind.TOPIC, VertexKind.SERVICE, VertexKind.ACTION)
 
 
 def render(graphs: Sequence[Graph], shown: int = 0) -> str:
