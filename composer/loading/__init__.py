@@ -31,7 +31,7 @@ from composer.loading.reported import (
     identity,
     may_be_included,
 )
-from composer.loading.variants import Checked, Resolved, joined_diagnostics, resolve_file
+from composer.loading.variants import Resolved, joined_diagnostics, resolve_file
 from composer.model.resolve import NO_OVERRIDES, OverrideOptions, read_overrides
 from composer.project.settings import apply_rule_settings, check_rule_settings
 from composer.rules import all_checks, reported, run_checks
@@ -212,12 +212,7 @@ def _finish(file: Resolved, types: TypeCheck, checked: Collection[Path]) -> Load
     follow_ups -= kept
     diagnostics = first.diagnostics
     if len(file.variants) > 1:
-        diagnostics = joined_diagnostics(
-            [
-                Checked(item.values, (item.equal or item).diagnostics, item.places)
-                for item in file.variants
-            ]
-        )
+        diagnostics = joined_diagnostics(file.variants)
 
     # Selection: comments in the files and settings of the project silence diagnostics.
     included = {

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping as Map
-from dataclasses import field, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
 from composer.base.diagnostics import Diagnostic, shown
 from composer.base.fast_dataclass import dataclass
-from composer.base.source import SourceFile, Span
+from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
 from composer.language import schema
 from composer.language.document import read_document
 from composer.language.expand import expand
 from composer.language.rules import MAX_ENTRIES, MAX_NODES, TOO_LARGE
 from composer.language.schema import check_kind, check_schema, kind_of, with_intended_sections
-from composer.language.tree import Entry, LeftOut, Mapping, Scalar, Tree, entries
+from composer.language.tree import Entry, Mapping, Scalar, Tree, entries
 from composer.language.tree import Sequence as ListTree
 from composer.model.assembly import (
-    AssembledSystem,
+    Merged,
     NodeTypeFile,
     assemble,
     assemble_included,
@@ -68,30 +68,6 @@ class Definitions:
         return cls(folder, project, NodeTypes.of(project), shared[folders])
 
 
-@dataclass(frozen=True, slots=True)
-class Merged:
-    """A file merged with what it includes or extends.
-
-    ``tree`` is what ``compose config`` shows, ``expanded`` has values in place of variables.
-    ``folders`` and ``included`` are the folders of all files and the places that include them, by
-    file name. ``is_partial`` is true if nodes may be missing. ``left_out`` are entries that
-    conditions leave out. ``values`` is the number of keys and values that were read and made.
-    ``scenario`` is the file itself if it is a scenario; then the rest is about its system, whose
-    file is ``source``.
-    """
-
-    tree: Mapping | None = None
-    expanded: Mapping | None = None
-    diagnostics: list[Diagnostic] = field(default_factory=list)
-    folders: Map[str, Path] = field(default_factory=dict)
-    included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
-    is_partial: bool = False
-    left_out: tuple[LeftOut, ...] = ()
-    values: int = 0
-    scenario: Mapping | None = None
-    source: SourceFile | None = None
-
-
 def read(path: Path, shown: str | None = None) -> Document:
     """Return a file as a tree; ``shown`` is its name in diagnostics."""
     tree, source, diagnostics = read_document(path, shown)
@@ -117,7 +93,7 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
         case schema.SYSTEM | schema.NODE if (surplus := _surplus_entry(tree)) is not None:
             return Merged(diagnostics=[surplus])
         case schema.SYSTEM:
-            return _merged(
+            return _within_limits(
                 assemble(tree, document.source, definitions.folder, definitions.project, arguments)
             )
         case schema.NODE:
@@ -129,21 +105,10 @@ def merge(document: Document, definitions: Definitions, arguments: Map[str, Entr
             return Merged(diagnostics=[] if problem is None else [problem])
 
 
-def _merged(assembly: AssembledSystem) -> Merged:
-    surplus = None if assembly.tree is None else _surplus_entry(assembly.tree)
-    if surplus is not None:
-        return Merged(diagnostics=[*assembly.diagnostics, surplus])
-    return Merged(
-        assembly.tree,
-        assembly.tree,
-        assembly.diagnostics,
-        assembly.folders,
-        assembly.included,
-        assembly.is_partial,
-        assembly.left_out,
-        assembly.values,
-        source=assembly.source,
-    )
+def _within_limits(merged: Merged) -> Merged:
+    """Return a system; only its diagnostics if one of its sections has too many entries."""
+    surplus = None if merged.tree is None else _surplus_entry(merged.tree)
+    return merged if surplus is None else Merged(diagnostics=[*merged.diagnostics, surplus])
 
 
 def _merge_scenario(tree: Mapping, source: SourceFile, definitions: Definitions) -> Merged:
@@ -161,7 +126,7 @@ def _merge_scenario(tree: Mapping, source: SourceFile, definitions: Definitions)
         return Merged(diagnostics=diagnostics)
     named = Entry(Scalar("file", file.key.span), _system_path(file.value, folder, project))
     include = Mapping((named, *keys), tree.span)
-    merged = _merged(assemble_included(include, source, folder, project))
+    merged = _within_limits(assemble_included(include, source, folder, project))
     return replace(merged, diagnostics=[*diagnostics, *merged.diagnostics], scenario=tree)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Mapping as Map
 from dataclasses import field, replace
+from functools import cached_property
 from itertools import combinations, islice, product
 from math import prod
 
@@ -22,9 +23,10 @@ from composer.language.schema import SYSTEM, kind_of
 from composer.language.tree import Entry, Scalar, Tree, plain, word
 from composer.language.tree import Mapping as MapTree
 from composer.language.tree import Sequence as ListTree
-from composer.loading.merging import Definitions, Document, Merged, merge
+from composer.loading.merging import Definitions, Document, merge
 from composer.loading.reported import Identity, identity
 from composer.model import System
+from composer.model.assembly import Merged
 from composer.model.resolve import Overrides, resolve
 from composer.model.resolve.parameter_files import PARAMETER_SUBSTITUTION
 from composer.model.resolve.scenario import resolve_scenario
@@ -131,18 +133,6 @@ def chosen_values(tree: MapTree, arguments: Arguments) -> dict[str, str]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Checked:
-    """What is reported with one combination of arguments, ``values``.
-
-    ``places`` are the places of all keys and values of the system.
-    """
-
-    values: Mapping[str, str]
-    diagnostics: Sequence[Diagnostic]
-    places: frozenset[str] = frozenset()
-
-
 def places_of(tree: Tree) -> Iterator[str]:
     """Yield the place of every key and value."""
     yield str(tree.span)
@@ -156,7 +146,7 @@ def places_of(tree: Tree) -> Iterator[str]:
                 yield from places_of(item)
 
 
-def joined_diagnostics(checked: Sequence[Checked]) -> list[Diagnostic]:
+def joined_diagnostics(checked: Sequence[Variant]) -> list[Diagnostic]:
     """Return the diagnostics of all combinations, each once.
 
     A diagnostic that the first combination does not have names the arguments with which it appears.
@@ -164,7 +154,7 @@ def joined_diagnostics(checked: Sequence[Checked]) -> list[Diagnostic]:
     having: dict[Identity, list[int]] = {}
     samples: dict[Identity, list[Diagnostic]] = {}
     for number, item in enumerate(checked):
-        for diagnostic in item.diagnostics:
+        for diagnostic in (item.equal or item).diagnostics:
             key = identity(diagnostic)
             numbers = having.setdefault(key, [])
             if not numbers or numbers[-1] != number:
@@ -179,7 +169,7 @@ def joined_diagnostics(checked: Sequence[Checked]) -> list[Diagnostic]:
     ]
 
 
-def _is_used(diagnostic: Diagnostic, checked: Sequence[Checked], having: Sequence[int]) -> bool:
+def _is_used(diagnostic: Diagnostic, checked: Sequence[Variant], having: Sequence[int]) -> bool:
     """Return whether a declaration without a use in some combinations has one in another."""
     if diagnostic.rule.name not in _RULES_ABOUT_USES:
         return False
@@ -191,7 +181,7 @@ def _is_used(diagnostic: Diagnostic, checked: Sequence[Checked], having: Sequenc
     )
 
 
-def _named(diagnostic: Diagnostic, checked: Sequence[Checked], having: Sequence[int]) -> Diagnostic:
+def _named(diagnostic: Diagnostic, checked: Sequence[Variant], having: Sequence[int]) -> Diagnostic:
     if having[0] == 0:
         return diagnostic
     has = set(having)
@@ -220,7 +210,7 @@ def _smallest(names: tuple[str, ...], implies: Callable[[Iterable[str]], bool]) 
     return names
 
 
-@dataclass(slots=True)
+@dataclass(eq=False)
 class Variant:
     """A file with one combination of its arguments. ``context`` is None if there is no model.
 
@@ -239,7 +229,7 @@ class Variant:
         """The model."""
         return None if self.context is None else self.context.system
 
-    @property
+    @cached_property
     def places(self) -> frozenset[str]:
         """The places of all keys and values."""
         tree = self.merged.expanded

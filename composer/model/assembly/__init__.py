@@ -30,8 +30,8 @@ from composer.model.assembly.limits import INVALID_INCLUDE, SystemLimits
 from composer.project import Project
 
 __all__ = [
-    "AssembledSystem",
     "Inherited",
+    "Merged",
     "NodeTypeFile",
     "assemble",
     "assemble_included",
@@ -45,22 +45,27 @@ _PARTIAL_RULES = (INVALID_INCLUDE, CYCLE, DUPLICATE_NAME, TOO_LARGE)
 
 
 @dataclass(frozen=True, slots=True)
-class AssembledSystem:
-    """A merged system. ``tree`` is None if the system exceeds a limit.
+class Merged:
+    """A file merged with what it includes or extends.
 
-    ``folders`` are the folders of all files and ``included`` the places that include them, by file
-    name. ``is_partial`` is true if nodes may be missing or misnamed because of errors in
-    ``diagnostics``. ``left_out`` are entries that conditions leave out, ``values`` the number of
-    keys and values of all files, as written and as expanded. ``source`` is the file of the system.
+    ``tree`` is what ``compose config`` shows, ``expanded`` has values in place of variables; they
+    are None for a file that exceeds a limit. ``folders`` are the folders of all files and
+    ``included`` the places that include them, by file name. ``is_partial`` is true if nodes may be
+    missing or misnamed because of errors in ``diagnostics``. ``left_out`` are entries that
+    conditions leave out. ``values`` is the number of keys and values of all files, as written and
+    as expanded. ``scenario`` is the file itself if it is a scenario; then the rest is about its
+    system, whose file is ``source``.
     """
 
-    tree: Mapping | None
-    diagnostics: list[Diagnostic]
-    is_partial: bool = False
+    tree: Mapping | None = None
+    expanded: Mapping | None = None
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     folders: Map[str, Path] = field(default_factory=dict)
     included: Map[str, tuple[Span, ...]] = field(default_factory=dict)
+    is_partial: bool = False
     left_out: tuple[LeftOut, ...] = ()
     values: int = 0
+    scenario: Mapping | None = None
     source: SourceFile | None = None
 
 
@@ -70,7 +75,7 @@ def assemble(
     folder: Path,
     project: Project,
     arguments: Map[str, Entry] = MappingProxyType({}),
-) -> AssembledSystem:
+) -> Merged:
     """Return the system ``tree`` with its ``arguments`` expanded, merged with its includes.
 
     ``folder`` is the folder of its file; all included files must be in ``project``. Each file is
@@ -82,7 +87,7 @@ def assemble(
 
 def assemble_included(
     include: Mapping, source: SourceFile, folder: Path, project: Project
-) -> AssembledSystem:
+) -> Merged:
     """Return the system that an entry of ``include`` in the file ``source`` names.
 
     It has the arguments and overrides of the entry, and its own namespace.
@@ -99,31 +104,32 @@ def assemble_included(
 
 def _assembled(
     project: Project, merge: Callable[[IncludeResolver], tuple[Mapping | None, SourceFile]]
-) -> AssembledSystem:
+) -> Merged:
     diagnostics = LimitedDiagnostics()
     limits = SystemLimits([])
     resolver = IncludeResolver(IncludeReader(project, limits, diagnostics), limits, diagnostics)
     try:
         merged, source = merge(resolver)
     except TooManyErrors as stopped:
-        return AssembledSystem(None, stopped.diagnostics)
+        return Merged(diagnostics=stopped.diagnostics)
     except Stopped as stopped:
-        return AssembledSystem(None, [stopped.diagnostic])
+        return Merged(diagnostics=[stopped.diagnostic])
     if merged is None:
-        return AssembledSystem(None, diagnostics)
+        return Merged(diagnostics=diagnostics)
     is_partial = (
         resolver.is_partial
         or any(item.rule in _PARTIAL_RULES for item in diagnostics)
         or any(is_opaque(entry.name) for entry in entries(merged.get("nodes")))
     )
     included = {path: tuple(places.values()) for path, places in resolver.included.items()}
-    return AssembledSystem(
+    return Merged(
+        merged,
         merged,
         diagnostics,
-        is_partial,
         resolver.folders,
         included,
+        is_partial,
         resolver.left_out,
         resolver.values,
-        source,
+        source=source,
     )
