@@ -1,4 +1,4 @@
-"""The rules of reading files (YAML, schema, variables, copies), and the limits for their size.
+"""The rules of reading files (YAML, schema, variables, expressions), and the limits for their size.
 
 They allow any file written by hand and generated systems of 2 500 nodes. Checking a file of a
 megabyte takes at most about 2 seconds of processor time, whatever it contains, and 200 MB.
@@ -34,6 +34,7 @@ MISSING_VARIABLE = error("RC287", "missing-variable")
 CYCLE = error("RC283", "cycle")
 DUPLICATE_NAME = error("RC225", "duplicate-name")
 UNUSED_DECLARATION = info("RC242", "unused-declaration")
+INVALID_EXPRESSION = error("RC440", "invalid-expression")
 
 
 #: Bytes in a file; checked before it is read.

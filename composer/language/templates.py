@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Any, TypeAlias
 
+from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.language import tree
@@ -22,6 +23,7 @@ from composer.language.expressions import (
     ExpressionError,
     compile_expression,
 )
+from composer.language.rules import INVALID_EXPRESSION
 from composer.language.tree import ScalarValue, Tree
 
 _FORMAT = re.compile(r"[<>^]?[-+ ]?#?0?\d{0,2},?(\.\d{1,2})?[bdeEfFgGoxX%s]?", re.ASCII)
@@ -88,18 +90,9 @@ class Items:
 Template: TypeAlias = "Constant | Computed | Text | Record | Items"
 
 
-@dataclass(frozen=True, slots=True)
-class TemplateProblem:
-    """An error in a template."""
-
-    message: str
-    span: Span
-    hint: str | None = None
-
-
-def compile_template(value: Tree) -> tuple[Template | None, list[TemplateProblem]]:
+def compile_template(value: Tree) -> tuple[Template | None, list[Diagnostic]]:
     """Return the template that ``value`` describes, or None with all problems."""
-    problems: list[TemplateProblem] = []
+    problems: list[Diagnostic] = []
     template = _compile(value, problems)
     return (None, problems) if problems else (template, [])
 
@@ -153,7 +146,7 @@ def _text(part: str | Formatted, scope: Mapping[str, Any]) -> str:
         raise EvaluationError(message) from None
 
 
-def _compile(value: Tree, problems: list[TemplateProblem]) -> Template:
+def _compile(value: Tree, problems: list[Diagnostic]) -> Template:
     match value:
         case tree.Mapping():
             fields = tuple(
@@ -169,7 +162,7 @@ def _compile(value: Tree, problems: list[TemplateProblem]) -> Template:
             return Constant(value.value, value.span)
 
 
-def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem]) -> Template:
+def _compile_text(scalar: tree.Scalar, text: str, problems: list[Diagnostic]) -> Template:
     parts: list[str | Formatted] = []
     for match in _PIECE.finditer(text):
         offset, piece = match.start(), match[0]
@@ -177,7 +170,7 @@ def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem
             break
         if len(parts) > _MAX_PARTS:
             message = f"this text has more than {_MAX_PARTS} parts"
-            problems.append(TemplateProblem(message, scalar.part(offset, 1)))
+            problems.append(_problem(message, scalar.part(offset, 1)))
             break
         if piece in ("{{", "}}"):
             parts.append(piece[0])
@@ -185,7 +178,7 @@ def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem
             parts.extend(_compile_braces(scalar, offset, piece, problems))
         elif piece == "}":
             span = scalar.part(offset, 1)
-            problems.append(TemplateProblem("'}' closes nothing", span, "write '}}' for a brace"))
+            problems.append(_problem("'}' closes nothing", span, "write '}}' for a brace"))
         else:
             parts.append(piece)
     match parts:
@@ -200,11 +193,11 @@ def _compile_text(scalar: tree.Scalar, text: str, problems: list[TemplateProblem
 
 
 def _compile_braces(
-    scalar: tree.Scalar, offset: int, piece: str, problems: list[TemplateProblem]
+    scalar: tree.Scalar, offset: int, piece: str, problems: list[Diagnostic]
 ) -> list[str | Formatted]:
     if not piece.endswith("}"):
         span = scalar.part(offset, 1)
-        problems.append(TemplateProblem("'{' is not closed", span, "write '{{' for a brace"))
+        problems.append(_problem("'{' is not closed", span, "write '{{' for a brace"))
         return []
     inside = piece[1:-1]
     # The format follows the first colon outside quotes.
@@ -215,12 +208,16 @@ def _compile_braces(
     source = source.strip()
     if layout is not None and not (layout and _FORMAT.fullmatch(layout)):
         span = scalar.part(offset + piece.index(":" + layout) + 1, len(layout))
-        problems.append(TemplateProblem(f"'{layout}' is not a format", span, _FORMAT_HINT))
+        problems.append(_problem(f"'{layout}' is not a format", span, _FORMAT_HINT))
         return []
     try:
         expression = compile_expression(source)
     except ExpressionError as error:
         span = scalar.part(source_offset + error.offset, error.length)
-        problems.append(TemplateProblem(error.message, span, error.hint))
+        problems.append(_problem(error.message, span, error.hint))
         return []
     return [Formatted(expression, layout or "", scalar.part(source_offset, len(source)))]
+
+
+def _problem(message: str, span: Span, hint: str | None = None) -> Diagnostic:
+    return Diagnostic(INVALID_EXPRESSION, message, span, hint=hint)

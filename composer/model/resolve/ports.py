@@ -7,9 +7,10 @@ from collections.abc import Mapping as Map
 from functools import partial
 from typing import Any
 
-from composer.base.diagnostics import Diagnostic, error
+from composer.base.diagnostics import Diagnostic
 from composer.base.source import Located, Span
 from composer.language.expressions import Expression, ExpressionError, compile_expression
+from composer.language.rules import INVALID_EXPRESSION
 from composer.language.templates import Computed, Template, Text, compile_template
 from composer.language.tree import (
     Entry,
@@ -45,8 +46,6 @@ from composer.model import (
 )
 from composer.model.ports import CALL_TIMEOUT_MS
 from composer.model.resolve.qos import QosTable, implicit_qos
-
-RULE = error("RC440", "invalid-expression")
 
 #: The keys of a reaction of a port, a timer or a lifecycle transition.
 KEYS = ("when", "set", "log", "publish", "call", "respond")
@@ -94,7 +93,7 @@ def expression(tree: Tree | None, diagnostics: list[Diagnostic]) -> Located[Expr
         compiled = compile_expression(tree.value)
     except ExpressionError as error:
         span = tree.part(error.offset, error.length)
-        diagnostics.append(Diagnostic(RULE, error.message, span, hint=error.hint))
+        diagnostics.append(Diagnostic(INVALID_EXPRESSION, error.message, span, hint=error.hint))
         return None
     return Located(compiled, tree.part(0, len(tree.value)))
 
@@ -104,9 +103,7 @@ def template(tree: Tree | None, diagnostics: list[Diagnostic]) -> Template | Non
     if tree is None:
         return None
     compiled, problems = compile_template(tree)
-    diagnostics.extend(
-        Diagnostic(RULE, problem.message, problem.span, hint=problem.hint) for problem in problems
-    )
+    diagnostics.extend(problems)
     return compiled
 
 
@@ -282,5 +279,5 @@ def _written_period(tree: Tree, unit: PeriodUnit, diagnostics: list[Diagnostic])
         return Period(compiled.expression, unit, compiled.span)
     if isinstance(compiled, Text):
         message = f"'{unit}' takes a number or one '{{expression}}', not text around it"
-        diagnostics.append(Diagnostic(RULE, message, tree.span))
+        diagnostics.append(Diagnostic(INVALID_EXPRESSION, message, tree.span))
     return Period(None, unit, tree.span)
