@@ -107,15 +107,15 @@ def test_problem_is_located(text: str, marked: str, message: str) -> None:
     template, problems = compile_template(scalar(text, quoted=True))
     assert template is None
     problem = problems[0]
-    start = problem.span.column - COLUMN - 1
+    start = problem.primary.column - COLUMN - 1
     assert f"{problem.message} ({problem.hint})".startswith(message)
-    assert text[start : start + problem.span.length] == marked
+    assert text[start : start + problem.primary.length] == marked
 
 
 def test_a_problem_in_an_escaped_text_is_placed_at_the_whole() -> None:
     escaped = scalar("{count +}", verbatim=False)
     _, problems = compile_template(escaped)
-    assert [problem.span for problem in problems] == [escaped.span]
+    assert [problem.primary for problem in problems] == [escaped.span]
 
 
 def test_every_problem_of_a_tree_is_found() -> None:
