@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 from enum import StrEnum
 
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
 from composer.language.expressions import EvaluationError, Expression
-from composer.language.templates import Template
+from composer.language.templates import Template, expressions_in
 from composer.language.tree import Plain
 from composer.model.qos import QosProfile
 
@@ -195,19 +195,27 @@ class Reaction:
     """A reaction to an event, declared in YAML.
 
     If ``when`` is true, the fields take effect in this order: the new ``state`` (all values
-    computed from the old one), the log line, messages, calls and goals, the response. ``when_span``
-    is the span of the expression's text, so that a diagnostic can point into it.
+    computed from the old one), the log line, messages, calls and goals, the response.
     """
 
     span: Span = field(compare=False)
-    when: Expression | None = None
-    when_span: Span | None = field(default=None, compare=False)
+    when: Located[Expression] | None = None
     state: tuple[tuple[Located[str], Template], ...] = ()
     log: Template | None = None
     log_level: LogLevel = LogLevel.INFO
     publish: tuple[Send, ...] = ()
     call: tuple[Send, ...] = ()
     respond: Template | None = None
+
+    def expressions(self) -> Iterator[tuple[Expression, Span]]:
+        """Yield all expressions with their spans."""
+        if self.when is not None:
+            yield self.when.value, self.when.span
+        contents = [content for _, content in self.state]
+        contents += [send.content for send in (*self.publish, *self.call)]
+        for content in (*contents, self.log, self.respond):
+            if content is not None:
+                yield from expressions_in(content)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,8 +264,7 @@ class Port:
     reactions: tuple[tuple[Event, Reaction], ...] = ()
     timeout_ms: Located[float] | None = None  # clients: for the server and its (first) response
     result_timeout_ms: Located[float] | None = None  # action clients; None waits forever
-    accept: Expression | None = None  # action servers: which goals are accepted
-    accept_span: Span | None = field(default=None, compare=False)
+    accept: Located[Expression] | None = None  # action servers: which goals are accepted
     feedback: FeedbackSteps | None = None  # action servers
     result: Template | None = None  # action servers
     budget_ms: Located[float] | None = None  # maximum duration of its callback

@@ -8,7 +8,7 @@ Example::
     checker = FieldChecker(context.interfaces, scope)
     yield from checker.template(send.content, definition)   # publish, call, respond, result
     yield from checker.text(reaction.log)                   # log: checks only the expressions
-    yield from checker.condition(reaction.when, span)       # when, accept: true or false
+    yield from checker.condition(expression, span)          # when, accept: true or false
     yield from checker.expression(expression, span)         # anything else
 
 Each yields ``Problem(message, span, hint)``. A scope maps the names that an expression can use to

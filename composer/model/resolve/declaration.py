@@ -44,13 +44,7 @@ from composer.model import (
     UnknownKey,
 )
 from composer.model.resolve.parameters import read_parameters
-from composer.model.resolve.ports import (
-    NODE_EVENTS,
-    Events,
-    node_reactions,
-    read_ports,
-    read_timers,
-)
+from composer.model.resolve.ports import NODE_EVENTS, Events, PortReader
 from composer.model.resolve.qos import QosTable
 from composer.model.resolve.transforms import merged_transforms, read_transforms
 from composer.project.node_types import SourceFolders
@@ -60,7 +54,7 @@ from composer.project.node_types import SourceFolders
 _VALUES_PER_EXPRESSION = 20
 _CHARACTERS_PER_VALUE = 2
 _REFINED_SECTIONS = (*(kind.section for kind in PortKind), "timers")
-_REPLACED_KEYS = ("description", "only_declared", *(name for name, _ in NODE_EVENTS))
+_REPLACED_KEYS = ("description", "only_declared", *(f"on_{event}" for event in NODE_EVENTS))
 _OVERLAID_KEYS = ("state", "arguments", "executable", "component")
 _TRANSFORMS = "transforms"
 _PERIOD_KEYS = frozenset(unit.value for unit in PeriodUnit)
@@ -198,14 +192,15 @@ def declare(
     tree: Mapping, folders: SourceFolders, qos: QosTable, diagnostics: list[Diagnostic]
 ) -> Declaration:
     """Read the declaration of a node type or an inline node."""
+    reader = PortReader(diagnostics, qos)
     return Declaration(
         description=plain_text(tree.get("description")),
         implementation=read_implementation(tree, folders),
         parameters=read_parameters(tree.get("parameters")),
-        ports=read_ports(tree, qos, diagnostics),
-        timers=read_timers(tree, diagnostics),
+        ports=reader.ports(tree),
+        timers=reader.timers(tree),
         state=tuple((key(entry), plain(entry.value)) for entry in entries(tree.get("state"))),
-        reactions=node_reactions(tree, diagnostics),
+        reactions=reader.reactions(tree),
         introspection=tree.get("introspection"),
         only_declared=flag(tree.get("only_declared"), default=False),
         transforms=read_transforms(tree.entry("transforms")),

@@ -29,7 +29,7 @@ from composer.language.tree import (
 )
 from composer.model.names import join
 from composer.model.ports import LogLevel
-from composer.model.resolve.ports import expression, template
+from composer.model.resolve.ports import ExpressionReader
 from composer.model.scenario import (
     Action,
     Condition,
@@ -70,11 +70,11 @@ def resolve_scenario(
     return scenario, reader.diagnostics
 
 
-class _Reader:
+class _Reader(ExpressionReader):
     def __init__(self, system: System, folder: Path) -> None:
+        super().__init__([])
         self._namespace = system.namespace
         self._folder = folder
-        self.diagnostics: list[Diagnostic] = []
 
     def step(self, tree: Tree) -> Step:
         when = tree.get("when") if isinstance(tree, Mapping) else None
@@ -102,7 +102,7 @@ class _Reader:
         for item in entries(entry.value):
             target = self._name(verb, key(item))
             if verb in _CONTENTS:
-                yield Action(verb, target, template(item.value, self.diagnostics))
+                yield Action(verb, target, self.template(item.value))
             elif verb in _VALUES:
                 value = Located(plain(item.value), item.value.span)
                 yield Action(verb, target, value=value)
@@ -112,7 +112,7 @@ class _Reader:
                     for option in entries(item.value)
                     if isinstance(option.value, Scalar)
                 }
-                content = template(_get(item.value, "set"), self.diagnostics)
+                content = self.template(_get(item.value, "set"))
                 yield Action(verb, target, content, options=options)
 
     def _replay(self, entry: Entry) -> Action:
@@ -149,8 +149,8 @@ class _Reader:
             self._name(kind, text_or_opaque(tree.get(kind), tree.span)),
             _span(tree, kind),
             states=_states(tree.get(EventKind.STATE)),
-            where=expression(tree.get("where"), self.diagnostics),
-            fields=None if fields is None else template(fields.value, self.diagnostics),
+            where=self.expression(tree.get("where")),
+            fields=None if fields is None else self.template(fields.value),
             tolerance=value_or(number(tree.get("tolerance")), 0.0),
             node=text(tree.get("node")),
             level=value_or(choice(tree.get("level"), LogLevel), None),
@@ -171,7 +171,7 @@ class _Reader:
             events = tuple(self._condition(item) for item in given if isinstance(item, Mapping))
         elif kind in (ExpectationKind.RATE, ExpectationKind.SILENCE):
             topic = self._name(EventKind.MESSAGE, text_or_opaque(tree.get(kind), tree.span))
-            where = expression(tree.get("where"), self.diagnostics)
+            where = self.expression(tree.get("where"))
             condition = Condition(EventKind.MESSAGE, topic, _span(tree, kind), where=where)
             events = (condition,)
         elif isinstance(kind, EventKind):

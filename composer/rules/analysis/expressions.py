@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
@@ -143,7 +143,7 @@ def expression_sites(context: Context) -> tuple[ExpressionSite, ...]:
 def _sites(system: System) -> Iterator[ExpressionSite]:
     for found in reactions(system):
         names = names_at(found.event)
-        for expression, span in reaction_expressions(found.reaction):
+        for expression, span in found.reaction.expressions():
             yield ExpressionSite(found.node, expression, span, names, found.event, found.port)
     for node in system.nodes:
         for port in node.ports:
@@ -159,27 +159,12 @@ def names_at(event: Event) -> tuple[str, ...]:
     return (*EVENT_NAMES.get(event, ()), *COMMON_NAMES)
 
 
-def reaction_expressions(reaction: Reaction) -> Iterator[tuple[Expression, Span]]:
-    """Yield the expressions of a reaction with their spans."""
-    if reaction.when is not None:
-        yield reaction.when, reaction.when_span or reaction.span
-    message_templates = [content for _, content in reaction.state]
-    message_templates += [send.content for send in (*reaction.publish, *reaction.call)]
-    yield from _in_templates((*message_templates, reaction.log, reaction.respond))
-
-
 def _goal_expressions(port: Port) -> Iterator[tuple[Expression, Span]]:
     """Yield the expressions of an action server that are not in its reactions."""
     if port.accept is not None:
-        yield port.accept, port.accept_span or port.span
-    steps = port.feedback.content if port.feedback is not None else None
-    yield from _in_templates((steps, port.result))
-
-
-def _in_templates(templates: Iterable[Template | None]) -> Iterator[tuple[Expression, Span]]:
-    for template in templates:
-        if template is not None:
-            yield from expressions_in(template)
+        yield port.accept.value, port.accept.span
+    for content, _ in contents_of_goal(port):
+        yield from expressions_in(content)
 
 
 class _NameTypes(dict[str, ValueType]):
@@ -283,7 +268,7 @@ def _reaction(
 ) -> Iterator[Problem]:
     reaction = site.reaction
     if reaction.when is not None:
-        yield from checker.condition(reaction.when, reaction.when_span or reaction.span)
+        yield from checker.condition(reaction.when.value, reaction.when.span)
     for name, content in reaction.state:
         found = list(checker.text(content))
         yield from found or _state(content, states.get(name.value, ANYTHING), checker)
@@ -332,7 +317,7 @@ def _filled(checker: FieldChecker, content: Template, message: Message | None) -
 
 def _action_server(context: Context, checker: FieldChecker, port: Port) -> Iterator[Problem]:
     if port.accept is not None:
-        yield from checker.condition(port.accept, port.accept_span or port.span)
+        yield from checker.condition(port.accept.value, port.accept.span)
     messages = context.messages(port)
     for content, part in contents_of_goal(port):
         yield from _filled(checker, content, messages.get(part))

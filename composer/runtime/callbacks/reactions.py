@@ -7,7 +7,7 @@ from typing import Any, Protocol, TypeAlias
 
 from composer.behavior import Publisher
 from composer.language.expressions import EvaluationError, Expression
-from composer.language.templates import Template, evaluate, expressions_in
+from composer.language.templates import Template, evaluate
 from composer.model import Reaction
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.ros.messages import Build, compile_message
@@ -60,12 +60,12 @@ class RunningReaction:
     ) -> None:
         """Compile it. Raises MessageError for content that never fits its message type."""
         self._context = context
-        self._when = reaction.when.holds if reaction.when is not None else None
+        self._when = reaction.when.value.holds if reaction.when is not None else None
         self._actions = tuple(_actions(context, reaction, publishers, clients))
         self._respond: Build | None = None
         if reaction.respond is not None and response_type is not None:
             self._respond = compile_message(reaction.respond, response_type, "'respond'")
-        self._needs_now = any(uses_now(expression) for expression in _expressions(reaction))
+        self._needs_now = any(uses_now(expression) for expression, _ in reaction.expressions())
         self.count = 0
 
     def run(self, **values: Any) -> Any:
@@ -88,17 +88,6 @@ class RunningReaction:
 def uses_now(expression: Expression) -> bool:
     """Return whether ``expression`` uses the time."""
     return any(path.root == "now" for path in expression.paths)
-
-
-def _expressions(reaction: Reaction) -> Iterable[Expression]:
-    if reaction.when is not None:
-        yield reaction.when
-    templates: list[Template | None] = [content for _, content in reaction.state]
-    templates += [send.content for send in (*reaction.publish, *reaction.call)]
-    templates += [reaction.log, reaction.respond]
-    for template in templates:
-        if template is not None:
-            yield from (expression for expression, _ in expressions_in(template))
 
 
 def _actions(

@@ -69,7 +69,7 @@ class GoalExecutor(RunningPort, Generic[G]):
         self._callback = f"action server '{self._name}'"
         self._type = action_type
         self._handlers = handlers
-        self._accepts = port.accept.holds if port.accept is not None else None
+        self._accepts = port.accept.value.holds if port.accept is not None else None
         self._goals: dict[G, bool] = {}  # each of them true: popping is atomic
         self._limit = None if port.reentrant else port.qos.profile.queue_depth
         self._queue = queue_for(context, self._run, None, depth=None, reentrant=port.reentrant)
