@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cache
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.base.diagnostics import (
     Diagnostic,
@@ -33,7 +33,7 @@ from composer.model import BehaviorReference, Node
 from composer.python_code.checks.node_code import code_problems
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.modules import nearby_modules
-from composer.python_code.nodes import use_of
+from composer.python_code.nodes import NodeClass, use_of
 from composer.python_code.problems import Family, Problem
 from composer.python_code.syntax import Method
 from composer.python_code.trees import start_span, walk
@@ -70,8 +70,6 @@ TOO_EARLY = warning("RC459", "too-early")
 UNDECLARED_PARAMETER = error("RC483", "undeclared-parameter")
 MISSING_CONSTRUCTOR = error("RC484", "missing-constructor")
 
-#: What a Python file is for: a behavior, or an rclpy class.
-What: TypeAlias = Literal["behavior", "class"]
 #: What a family takes for right: the ports and parameters of YAML, or a folder of the project.
 _RELIES_ON: Mapping[Family, tuple[str, ...]] = {
     Family.PORT: ("port",),
@@ -93,13 +91,14 @@ def as_warning(rule: Rule, *, unless: bool = False) -> Rule:
 
 
 def diagnostic(
-    problem: Problem, node: Node | None, source: BehaviorSource, what: What, interfaces: Interfaces
+    problem: Problem, node: Node, source: BehaviorSource, interfaces: Interfaces
 ) -> Diagnostic:
-    """Return the diagnostic of a problem in the code of ``node``; None if it is of any node.
+    """Return the diagnostic of a problem in the code of a node.
 
     In a class nothing but its syntax is an error: it may run as it does today.
     """
     rule = _rules()[problem.family.value]
+    what = "class" if node.behavior is None else "behavior"
     is_error = (what == "behavior" and problem.is_certain) or problem.family is Family.SYNTAX
     if rule.severity is Severity.ERROR and not is_error:
         rule = as_warning(rule)
@@ -122,12 +121,12 @@ def _subjects(problem: Problem, interfaces: Interfaces) -> Iterator[Subject]:
             return
 
 
-def _relies_on(problem: Problem, node: Node | None, source: BehaviorSource) -> Iterator[Subject]:
+def _relies_on(problem: Problem, node: Node, source: BehaviorSource) -> Iterator[Subject]:
     """Yield what a problem takes for right: ports and parameters of its line and its handler."""
     kinds = _RELIES_ON.get(problem.family, ())
     if "folder" in kinds:
         yield ("folder", "interfaces")
-    if node is None or not kinds:
+    if not kinds:
         return
     span = problem.span
     names = set(re.findall(r"\w+", span.file.line(span.line)))
@@ -152,42 +151,41 @@ def _rules() -> Mapping[str, Rule]:
 
 def check_python(context: Context) -> Iterator[Diagnostic]:
     """Report the problems of the files of behaviors and classes, each once."""
-    for source, what, problem in _alternatives(context):
-        yield diagnostic(problem, None, source, what, context.interfaces)
-    for node, source, what in sources(context):
+    for node, source, problem in _alternatives(context):
+        yield diagnostic(problem, node, source, context.interfaces)
+    for node, source in sources(context):
         for problem in code_problems(node, source, context.interfaces):
-            yield diagnostic(problem, node, source, what, context.interfaces)
+            yield diagnostic(problem, node, source, context.interfaces)
 
 
-def sources(context: Context) -> Iterator[tuple[Node, BehaviorSource, What]]:
+def sources(context: Context) -> Iterator[NodeClass]:
     """Yield the behaviors and classes of a system, each once for each way to use it."""
-    for node, source in distinct_behaviors(context):
-        yield node, source, "behavior"
+    yield from distinct_behaviors(context)
     for item in distinct_classes(context):
-        yield item.node, item.source, "class"
+        yield item.node, item.source
 
 
-def _alternatives(context: Context) -> Iterator[tuple[BehaviorSource, What, Problem]]:
+def _alternatives(context: Context) -> Iterator[tuple[Node, BehaviorSource, Problem]]:
     """Yield the messages and other interfaces that a condition chooses at run time."""
     packages = context.interfaces.packages()
     modules = {
-        module.path: (source, what, module)
-        for _, source, what in sources(context)
+        module.path: (node, source, module)
+        for node, source in sources(context)
         for module in source.own_modules
     }
-    for source, what, module in modules.values():
+    for node, source, module in modules.values():
         chosen = {
             name
             for name, origins in module.alternatives.items()
             if any(origin.module.partition(".")[0] in packages for origin in origins)
         }
-        for node in walk(module.tree.body) if chosen else ():
-            if isinstance(node, ast.alias) and (node.asname or node.name) in chosen:
-                chosen.remove(node.asname or node.name)
-                name = node.asname or node.name
+        for item in walk(module.tree.body) if chosen else ():
+            name = (item.asname or item.name) if isinstance(item, ast.alias) else None
+            if isinstance(item, ast.alias) and name in chosen:
+                chosen.remove(name)
                 message = f"'{name}' is imported from several modules, so its uses are not checked"
-                span = start_span(node, len(node.name), module.source)
-                yield source, what, Problem(Family.NOT_CHECKED, message, span)
+                span = start_span(item, len(item.name), module.source)
+                yield node, source, Problem(Family.NOT_CHECKED, message, span)
 
 
 def unnamed(reference: BehaviorReference, what: str) -> Iterator[Diagnostic]:
@@ -247,11 +245,11 @@ class TypeCheck:
         """Start to check the Python code of the systems."""
         from composer.python_code.checker.check import start_checks  # noqa: PLC0415 - slow
 
-        by_interfaces: dict[int, tuple[Interfaces, dict[_Use, tuple[Node, BehaviorSource]]]] = {}
+        by_interfaces: dict[int, tuple[Interfaces, dict[_Use, NodeClass]]] = {}
         for context in contexts:
             key = id(context.interfaces)
             _, classes = by_interfaces.setdefault(key, (context.interfaces, {}))
-            for node, source, _ in sources(context):
+            for node, source in sources(context):
                 classes.setdefault(use_of(node, source), (node, source))
         return cls(
             [
@@ -269,8 +267,8 @@ class TypeCheck:
         if self._problems is None:
             self._problems = self._collected()
         found = [
-            (node, problem, diagnostic(problem, node, source, what, context.interfaces))
-            for node, source, what in sources(context)
+            (node, problem, diagnostic(problem, node, source, context.interfaces))
+            for node, source in sources(context)
             for problem in self._problems.get(use_of(node, source), ())
         ]
         without_self = [item for _, problem, item in found if problem.family is Family.SELF]
