@@ -38,6 +38,34 @@ from composer.model.transforms import Transforms
 DEFAULT_TIMEOUT_MS = 10_000.0
 
 
+#: Services of every node for tools, with their types.
+PARAMETER_SERVICES = {
+    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+    "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
+    "get_parameters": "rcl_interfaces/srv/GetParameters",
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
+    "set_parameters": "rcl_interfaces/srv/SetParameters",
+    "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
+}
+LIFECYCLE_SERVICES = {
+    "change_state": "lifecycle_msgs/srv/ChangeState",
+    "get_state": "lifecycle_msgs/srv/GetState",
+    "get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
+    "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
+    "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
+}
+LOGGER_SERVICES = {
+    "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
+    "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
+}
+TOOL_SERVICES = {
+    **PARAMETER_SERVICES,
+    **LIFECYCLE_SERVICES,
+    **LOGGER_SERVICES,
+    "get_type_description": "type_description_interfaces/srv/GetTypeDescription",
+}
+
+
 class OnFailure(StrEnum):
     """How to handle a failed node."""
 

@@ -20,6 +20,7 @@ from composer.base.spelling import misspelled
 from composer.language.rules import MAX_ERRORS
 from composer.model import ImplementationKind, Node, Port, PortKind, Remapping
 from composer.model.names import expand_name, remapped_name, topic_name_problem
+from composer.model.node import TOOL_SERVICES
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.subjects import wiring
 
@@ -31,25 +32,7 @@ _RULE_IF_PASSED_ON = replace(UNKNOWN_REMAPPING, severity=Severity.INFO)
 #: Topics and services that every ROS node has without declaring them.
 _OF_EVERY_NODE = frozenset(("/clock", "/diagnostics", "/parameter_events", "/rosout"))
 #: The same, in the namespace with the name of the node.
-_PRIVATE_OF_EVERY_NODE = frozenset(
-    (
-        "describe_parameters",
-        "get_logger_levels",
-        "get_parameter_types",
-        "get_parameters",
-        "get_type_description",
-        "list_parameters",
-        "set_logger_levels",
-        "set_parameters",
-        "set_parameters_atomically",
-        "change_state",
-        "get_available_states",
-        "get_available_transitions",
-        "get_state",
-        "get_transition_graph",
-        "transition_event",
-    )
-)
+_PRIVATE_OF_EVERY_NODE = frozenset((*TOOL_SERVICES, "transition_event"))
 _NAMES_IN_CODE = (
     ImplementationKind.CLASS,
     ImplementationKind.EXECUTABLE,

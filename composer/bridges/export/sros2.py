@@ -13,7 +13,7 @@ from xml.etree import ElementTree as Xml
 from composer.base.fast_dataclass import dataclass
 from composer.model import USE_SIM_TIME, ImplementationKind, Node, PortKind, System, member_system
 from composer.model.names import join
-from composer.plan.drift.drift import LIFECYCLE_SERVICES, LOGGER_SERVICES, PARAMETER_SERVICES
+from composer.model.node import LIFECYCLE_SERVICES, LOGGER_SERVICES, PARAMETER_SERVICES
 
 _VERSION = "0.2.0"
 _MANAGER = "manager"

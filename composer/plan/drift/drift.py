@@ -10,34 +10,9 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.language.tree import Plain
 from composer.model import PortKind
+from composer.model.node import TOOL_SERVICES
 from composer.model.qos import QosProfile
 
-#: Services of every node for tools, with their types.
-PARAMETER_SERVICES = {
-    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
-    "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
-    "get_parameters": "rcl_interfaces/srv/GetParameters",
-    "list_parameters": "rcl_interfaces/srv/ListParameters",
-    "set_parameters": "rcl_interfaces/srv/SetParameters",
-    "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
-}
-LIFECYCLE_SERVICES = {
-    "change_state": "lifecycle_msgs/srv/ChangeState",
-    "get_state": "lifecycle_msgs/srv/GetState",
-    "get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
-    "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
-    "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
-}
-LOGGER_SERVICES = {
-    "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
-    "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
-}
-_TOOL_SERVICES = {
-    **PARAMETER_SERVICES,
-    **LIFECYCLE_SERVICES,
-    **LOGGER_SERVICES,
-    "get_type_description": "type_description_interfaces/srv/GetTypeDescription",
-}
 #: Topics of every node for tools.
 _TOOL_TOPICS = {
     "/rosout": "rcl_interfaces/msg/Log",
@@ -66,7 +41,7 @@ class ObservedEndpoint:
         """True for the endpoints of parameters, logs and lifecycle."""
         last = self.name.rpartition("/")[2]
         if self.kind.channel.value == "service":
-            return _TOOL_SERVICES.get(last) == self.type
+            return TOOL_SERVICES.get(last) == self.type
         if self.kind.channel.value == "topic":
             known = _TOOL_TOPICS.get(self.name) == self.type
             return known or (last == "transition_event" and self.type == _TRANSITION_EVENT)
