@@ -24,6 +24,21 @@ UNSUITED_QOS = info("RC314", "unsuited-qos")
 #: In hertz; on slower topics a message is taken before the next one arrives.
 FAST_HZ = 10.0
 _SHOWN_SINKS = 3
+#: What is wrong if a duration of a publisher is shorter than its period, and a hint.
+_TOO_SHORT = {
+    "liveliness_lease_duration_ms": (
+        "the lease of publisher '{}' ends after {} ms, but it publishes every {} ms",
+        "make the lease longer than the period, with some margin",
+    ),
+    "deadline_ms": (
+        "publisher '{}' offers a deadline of {} ms, but publishes every {} ms",
+        "make the deadline longer than the period, with some margin",
+    ),
+    "lifespan_ms": (
+        "messages of '{}' expire after {} ms, but are published every {} ms",
+        "make the lifespan longer than the period",
+    ),
+}
 _SENSOR_PACKAGE = "sensor_msgs/msg/"
 #: Messages of that package that are small, and whose consumers usually request reliable QoS.
 _STATES = frozenset({"sensor_msgs/msg/JointState", "sensor_msgs/msg/MultiDOFJointState"})
@@ -135,44 +150,18 @@ def check_qos_implicit(context: Context) -> Iterator[Diagnostic]:
 
 
 def check_publishing_period(context: Context) -> Iterator[Diagnostic]:
-    """Compare deadlines and lifespans with the periods of the publishing timers."""
+    """Compare deadlines, lifespans and leases with the periods of the publishing timers."""
     for endpoint, period_s in context.once(timed_publishers):
-        qos, name, period_ms = endpoint.port.qos, endpoint.port.name, period_s * 1000.0
-        if not qos.known:
-            continue
-        deadline_ms, lifespan_ms = qos.profile.deadline_ms, qos.profile.lifespan_ms
-        if deadline_ms is not None and deadline_ms < period_ms:
-            yield Diagnostic(
-                QOS_DURATION_TOO_SHORT,
-                f"publisher '{name}' offers a deadline of {number(deadline_ms)} ms, "
-                f"but publishes every {number(period_ms)} ms",
-                qos.policy_span("deadline_ms"),
-                hint="make the deadline longer than the period, with some margin",
-            )
-        if lifespan_ms is not None and lifespan_ms < period_ms:
-            yield Diagnostic(
-                QOS_DURATION_TOO_SHORT,
-                f"messages of '{name}' expire after {number(lifespan_ms)} ms, "
-                f"but are published every {number(period_ms)} ms",
-                qos.policy_span("lifespan_ms"),
-                hint="make the lifespan longer than the period",
-            )
-
-
-def check_lease_too_short(context: Context) -> Iterator[Diagnostic]:
-    """Compare the leases that messages renew with the periods of the publishing timers."""
-    for endpoint, period_s in context.once(timed_publishers):
-        qos = endpoint.port.qos
-        lease_ms = qos.profile.liveliness_lease_duration_ms
-        is_manual = qos.profile.liveliness is Liveliness.MANUAL_BY_TOPIC
-        if qos.known and is_manual and lease_ms is not None and lease_ms < period_s * 1000.0:
-            yield Diagnostic(
-                QOS_DURATION_TOO_SHORT,
-                f"the lease of publisher '{endpoint.port.name}' ends after {number(lease_ms)} ms, "
-                f"but it publishes every {number(period_s * 1000.0)} ms",
-                qos.policy_span("liveliness_lease_duration_ms"),
-                hint="make the lease longer than the period, with some margin",
-            )
+        qos, period_ms = endpoint.port.qos, period_s * 1000.0
+        is_renewed = qos.profile.liveliness is Liveliness.MANUAL_BY_TOPIC  # by its messages
+        for policy, (problem, hint) in _TOO_SHORT.items():
+            limit_ms = getattr(qos.profile, policy)
+            if not qos.known or limit_ms is None or limit_ms >= period_ms:
+                continue
+            if policy != "liveliness_lease_duration_ms" or is_renewed:
+                text = problem.format(endpoint.port.name, number(limit_ms), number(period_ms))
+                span = qos.policy_span(policy)
+                yield Diagnostic(QOS_DURATION_TOO_SHORT, text, span, hint=hint)
 
 
 def check_shallow_queue(context: Context) -> Iterator[Diagnostic]:
