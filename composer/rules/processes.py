@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, error, warning
 from composer.base.source import Located
 from composer.language.rules import UNUSED_DECLARATION
 from composer.model import Channel, DiscoveryKind, Host
@@ -29,10 +29,9 @@ from composer.rules.analysis.subjects import (
     NODES_OF_PROCESSES,
     earlier_errors,
     is_misspelled,
-    unknown_subjects,
 )
 from composer.rules.executors import LOST_BETWEEN_PROCESSES
-from composer.rules.references import UNKNOWN_NODE, unknown_names
+from composer.rules.references import unknown_names
 
 CONFLICTING_PROCESS = error("RC479", "conflicting-process")
 MANY_SERVICES = warning("RC488", "many-services")
@@ -58,29 +57,15 @@ _KIND_OF_KEY = {
 def check_unknown_process(context: Context) -> Iterator[Diagnostic]:
     """Check the processes of nodes, and the nodes of processes."""
     system = context.system
-    if context.is_partial:
-        return
     named = (
         (f"node '{node.name}' runs in '{node.process}'", node.process) for node in system.nodes
     )
     yield from unknown_names(context, "process", named)
-    nodes = [node.name.value for node in system.nodes]
-    known = frozenset(nodes)
     for process in system.processes:
-        for node_name in process.nodes:
-            if node_name.value in known or is_unresolved(node_name.value):
-                continue
-            yield Diagnostic(
-                UNKNOWN_NODE,
-                f"process '{process.name}' names '{node_name}', which is not a node of this system",
-                node_name.span,
-                hint=suggestion(node_name.value, nodes),
-                subjects=(
-                    *unknown_subjects("node", node_name.value, nodes),
-                    ("nodes of process", process.name.value),
-                    NODES_OF_PROCESSES,
-                ),
-            )
+        named = ((f"process '{process.name}' names '{name}'", name) for name in process.nodes)
+        subjects = (("nodes of process", process.name.value), NODES_OF_PROCESSES)
+        for unknown in unknown_names(context, "node", named):
+            yield replace(unknown, subjects=(*unknown.subjects, *subjects))
 
 
 def check_conflicting_process(context: Context) -> Iterator[Diagnostic]:
