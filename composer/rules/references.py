@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, Subject, error, suggestion
 from composer.base.source import Located
-from composer.model import DEFAULT_EXECUTOR, Connection, Endpoint, Node, PortKind, System
+from composer.model import DEFAULT_EXECUTOR, Connection, Endpoint, Node, System
 from composer.rules.analysis.context import Context, is_unresolved, location, part_of
 from composer.rules.analysis.expressions import SENDERS, sends
 from composer.rules.analysis.formatting import a
@@ -25,7 +25,6 @@ UNKNOWN_PORT = error("RC203", "unknown-port")
 UNDECLARED_NAME = error("RC205", "undeclared-name")
 PORT_CONNECTED_TWICE = error("RC212", "port-connected-twice")
 _SECTIONS = {"node": "nodes", "executor": "executors", "process": "processes", "host": "hosts"}
-_PORT_SECTIONS = frozenset(kind.section for kind in PortKind)
 
 
 def endpoints(system: System) -> Iterator[tuple[Endpoint, Connection | None]]:
@@ -200,7 +199,7 @@ def _port_of_endpoint(
 
 def _overridden_ports(node: Node) -> Iterator[Diagnostic]:
     for unknown in node.unknown:
-        if unknown.section not in _PORT_SECTIONS:
+        if unknown.section not in PORT_SECTIONS:
             continue
         name = unknown.name
         other = node.port(name.value)

@@ -48,7 +48,7 @@ PARAMETER_SUBSTITUTION = warning("RC045", "parameter-substitution")
 PARAMETERS = "ros__parameters"
 _MISSPELLED = ("parameters", "params", "ros_params", "ros__params", "ros_parameters")
 _SUBSTITUTION = re.compile(r"\$\([a-z][a-z0-9_-]*(?: [^)]*)?\)|\$\{[^}]*\}")
-_TYPES: dict[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
+SCALAR_TYPES: dict[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
 
 
 def read_parameter_files(
@@ -170,7 +170,7 @@ class _Reader:
         return self._check_types(name, scalars)
 
     def _check_types(self, name: str, items: Iterable[Scalar]) -> bool:
-        types = [(_TYPES[type(item.value)], item.span) for item in items]
+        types = [(SCALAR_TYPES[type(item.value)], item.span) for item in items]
         other = next((item for item in types if item[0] != types[0][0]), None)
         if other is None:
             return True

@@ -34,12 +34,11 @@ from composer.model import (
 )
 from composer.model.qos_overrides import PREFIX, override_parameter
 from composer.model.resolve.node_settings import NodeNames
-from composer.model.resolve.parameter_files import ParameterFiles
+from composer.model.resolve.parameter_files import SCALAR_TYPES, ParameterFiles
 
 #: The type of a parameter whose bare value has no clear type, such as an empty list.
 UNKNOWN_TYPE = ""
 _USE_SIM_TIME_DESCRIPTION = "Whether the node uses the time of /clock."
-_SCALAR_TYPES: Map[type, str] = {bool: "bool", int: "integer", float: "double", str: "string"}
 #: Names that match every node. rcl joins sections of the same name, at the place of the first.
 _FIRST_FOR_ALL, _LAST_FOR_ALL = "/**/*", "/*/**"
 
@@ -118,10 +117,10 @@ def rclpy_type(value: object) -> str | None:
     Unlike in YAML files, a list of integers and doubles is refused.
     """
     if isinstance(value, list):
-        kinds = {_SCALAR_TYPES.get(type(item)) for item in value}
+        kinds = {SCALAR_TYPES.get(type(item)) for item in value}
         kind = kinds.pop() if len(kinds) == 1 else None
         return f"{kind}_array" if kind is not None else None
-    return _SCALAR_TYPES.get(type(value))
+    return SCALAR_TYPES.get(type(value))
 
 
 def promoted(value: Plain, kind: str) -> Plain:

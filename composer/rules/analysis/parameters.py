@@ -20,13 +20,6 @@ _LIMITS = {
 }
 #: Tolerance for a whole number of steps, in steps.
 _TOLERANCE = 1e-6
-_ELEMENTS = {
-    ParameterType.BYTE_ARRAY: "byte",
-    ParameterType.BOOL_ARRAY: "bool",
-    ParameterType.INTEGER_ARRAY: "integer",
-    ParameterType.DOUBLE_ARRAY: "double",
-    ParameterType.STRING_ARRAY: "string",
-}
 KNOWN_TYPES = frozenset(kind.value for kind in ParameterType)
 
 
@@ -117,8 +110,8 @@ class RangeProblem:
 
 def type_problem(value: Plain, kind: str) -> str | None:
     """Describe ``value`` if it does not have the ParameterType ``kind``; None if it has."""
-    element = _ELEMENTS.get(ParameterType(kind))
-    if element is None:
+    element = kind.removesuffix("_array")
+    if element == kind:
         return None if _is_element(value, kind) else f"{describe(value)}{_limit(value, kind)}"
     if not isinstance(value, list):
         return describe(value)
