@@ -7,7 +7,6 @@ from collections.abc import Mapping as Map
 from functools import partial
 from pathlib import Path
 
-from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass, replace
 from composer.base.source import Located
 from composer.language.tree import (
@@ -38,7 +37,6 @@ from composer.model import (
     Remapping,
     Supervision,
     Transforms,
-    UnknownKey,
 )
 from composer.model.assembly.limits import SystemLimits
 from composer.model.names import expand_name, remapped_name
@@ -47,7 +45,6 @@ from composer.model.resolve.connections import PortConnection, PortConnections, 
 from composer.model.resolve.declaration import (
     Declaration,
     Implementation,
-    declare,
     read_external,
     refined,
     refines,
@@ -59,12 +56,10 @@ from composer.model.resolve.node_settings import (
     read_introspection,
     read_supervision,
 )
-from composer.model.resolve.node_types import NodeTypeLoader
+from composer.model.resolve.node_types import DeclaredNode, NodeTypeLoader
 from composer.model.resolve.overrides import Overrides
 from composer.model.resolve.parameter_files import ParameterFiles
 from composer.model.resolve.parameters import GivenValues, node_parameters
-from composer.model.resolve.qos import QosTable
-from composer.project.node_types import SourceFolders
 
 _NOTHING = Declaration("", Implementation(), (), (), (), (), ())
 
@@ -73,10 +68,8 @@ _NOTHING = Declaration("", Implementation(), (), (), (), (), ())
 class SystemContext:
     """What resolving any node of a system needs."""
 
-    folders: SourceFolders
     namespace: Located[str]  # absolute
     types: NodeTypeLoader
-    qos: QosTable
     port_connections: PortConnections
     overrides: Overrides
     supervision: Supervision
@@ -85,30 +78,16 @@ class SystemContext:
     parameter_sections: Callable[[], tuple[ParameterSection, ...]]  # all of the files
     use_sim_time: tuple[Entry, ...]  # the system's entry, if it has one
     processes: Map[str, Located[str]]  # by the nodes that they name
-    diagnostics: list[Diagnostic]
     limits: SystemLimits
-
-
-@dataclass(frozen=True, slots=True)
-class _Declared:
-    """A declaration, and whether it is complete."""
-
-    declaration: Declaration
-    unknown: tuple[UnknownKey, ...] = ()
-    type_found: bool = True
-    complete: bool = True
-    type_files: tuple[Path, ...] = ()
-    own_type_name: Located[str] | None = None
 
 
 def resolve_node(entry: Entry, context: SystemContext) -> Node:
     """Return the node of an entry in ``nodes``."""
     tree = mapping(entry)
     type_entry = tree.entry("type")
-    if type_entry is None:
-        made = _Declared(declare(tree, context.folders, context.qos, context.diagnostics))
-    else:
-        made = _typed(type_entry, tree, context)
+    type_name = text(type_entry.value) if type_entry is not None else None
+    path = context.types.find(type_name) if type_name is not None else None
+    made = _declared(tree, type_entry, path, context.types)
     declared = made.declaration
     context.limits.count("declared", declared.size, entry.key.span)
     external = read_external(tree.entry("external"))
@@ -129,6 +108,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         is_program=declared.implementation.executable is not None and external is None,
     )
     context.limits.count("sections", parameters.sections_from_files, entry.key.span)
+    unknown = unknown_keys(made.tree, tree) if made.complete and made.files else ()
     is_complete = made.complete and not declared.implementation.conflicting
     overridden = partial(with_overrides, overrides=parameters.qos_overrides)
     if transforms is not None:
@@ -142,9 +122,9 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         own_name=names.own_name,
         span=entry.key.span,
         type_name=text_or_opaque(type_entry.value, type_entry.key.span) if type_entry else None,
-        type_found=made.type_found,
-        type_files=made.type_files,
-        own_type_name=made.own_type_name,
+        type_found=type_entry is None or path is not None,
+        type_files=made.files,
+        own_type_name=text(made.tree.get("node")) if made.files else None,
         description=plain_text(tree.get("description")) or declared.description,
         behavior=declared.implementation.behavior,
         hosted_class=declared.implementation.hosted_class,
@@ -178,7 +158,7 @@ def resolve_node(entry: Entry, context: SystemContext) -> Node:
         else read_introspection(
             declared.introspection, context.introspection, tree.get("introspection")
         ),
-        unknown=(*made.unknown, *(parameters.unknown if is_complete else ())),
+        unknown=(*unknown, *(parameters.unknown if is_complete else ())),
         given=tuple(map(key, tree)),
         complete=is_complete,
     )
@@ -264,27 +244,20 @@ def _place_port(
     )
 
 
-def _typed(type_entry: Entry, tree: Mapping, context: SystemContext) -> _Declared:
-    name = text(type_entry.value)
-    path = context.types.find(name) if name is not None else None
-    if path is None:
-        return _Declared(_NOTHING, type_found=False, complete=False)
-    made = context.types.instantiate(path, tree.get("variables"), type_entry.value.span)
+def _declared(
+    tree: Mapping, type_entry: Entry | None, path: Path | None, types: NodeTypeLoader
+) -> DeclaredNode:
+    """Return what a node declares, or its type in the file ``path`` with the node's changes."""
+    if type_entry is None:
+        return DeclaredNode(tree, types.folders, types.declare(tree))
+    variables, span = tree.get("variables"), type_entry.value.span
+    made = None if path is None else types.instantiate(path, variables, span)
     if made is None:
-        return _Declared(_NOTHING, complete=False)
-    unknown = unknown_keys(made.tree, tree) if made.complete else ()
-    declaration = made.declaration
-    if refines(tree):
-        # Compiling the type's expressions again only repeats diagnostics, which are deduplicated.
-        merged = refined(made.tree, tree)
-        declaration = declare(merged, made.folders, context.qos, context.diagnostics)
-    return _Declared(
-        declaration,
-        unknown,
-        complete=made.complete,
-        type_files=made.files,
-        own_type_name=text(made.tree.get("node")),
-    )
+        return DeclaredNode(tree, types.folders, _NOTHING, complete=False)
+    if not refines(tree):
+        return made
+    # Compiling the type's expressions again only repeats diagnostics, which are deduplicated.
+    return replace(made, declaration=types.declare(refined(made.tree, tree), made.folders))
 
 
 def _remappings(tree: Tree | None) -> tuple[Remapping, ...]:

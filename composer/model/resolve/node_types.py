@@ -20,18 +20,18 @@ from composer.project.node_types import SourceFolders
 
 
 @dataclass(frozen=True, slots=True)
-class InstantiatedNodeType:
-    """A node type with the variables of a node.
+class DeclaredNode:
+    """What an inline node declares, or a node type with the variables of a node.
 
-    ``complete`` is false if its file has errors, so that declarations may be missing. ``files`` are
-    its own file and those of the types that it extends.
+    ``complete`` is false if the file of the type has errors, so that declarations may be missing.
+    ``files`` are its own file and those of the types that it extends.
     """
 
     tree: Mapping
     folders: SourceFolders
     declaration: Declaration
-    complete: bool
-    files: tuple[Path, ...]
+    complete: bool = True
+    files: tuple[Path, ...] = ()
 
 
 @dataclass(slots=True)
@@ -43,7 +43,7 @@ class NodeTypeLoader:
     diagnostics: list[Diagnostic]
     _found: dict[tuple[Path, str], Path | None] = field(default_factory=dict)
     _read: dict[Path, Inherited | None] = field(default_factory=dict)
-    _without_variables: dict[Path, InstantiatedNodeType | None] = field(default_factory=dict)
+    _without_variables: dict[Path, DeclaredNode | None] = field(default_factory=dict)
     _shapes: set[tuple[Path, str]] = field(default_factory=set)
 
     def find(self, name: Located[str]) -> Path | None:
@@ -53,9 +53,11 @@ class NodeTypeLoader:
             self._found[known] = self.folders.node_types_for(name.span).find(name.value)
         return self._found[known]
 
-    def instantiate(
-        self, path: Path, variables: Tree | None, span: Span
-    ) -> InstantiatedNodeType | None:
+    def declare(self, tree: Mapping, folders: SourceFolders | None = None) -> Declaration:
+        """Read the declaration of a node; ``folders`` are those of its type, if it has one."""
+        return declare(tree, folders or self.folders, self.qos, self.diagnostics)
+
+    def instantiate(self, path: Path, variables: Tree | None, span: Span) -> DeclaredNode | None:
         """Return the type in the file ``path`` with ``variables``; None if it cannot be read.
 
         ``span`` is the reference to the type.
@@ -75,14 +77,14 @@ class NodeTypeLoader:
 
     def _instantiate(
         self, path: Path, written: Inherited, tree: Mapping, given: dict[str, Entry]
-    ) -> InstantiatedNodeType:
+    ) -> DeclaredNode:
         expanded, found, *_ = expand(tree, given)
         found = [*found, *self._schema_diagnostics(path, expanded, given)]
         folders = SourceFolders(path.parent, written.folders, self.folders.node_types)
         declaration = declare(expanded, folders, self.qos, found)
         self.diagnostics.extend(found)
         files = tuple(file.path for file in written.files)
-        return InstantiatedNodeType(expanded, folders, declaration, not has_errors(found), files)
+        return DeclaredNode(expanded, folders, declaration, not has_errors(found), files)
 
     def _schema_diagnostics(
         self, path: Path, expanded: Mapping, given: dict[str, Entry]

@@ -157,10 +157,8 @@ def resolve_system(
     clock = _use_sim_time(tree, overrides)
     processes = tuple(map(_process, entries(tree.get("processes"))))
     context = SystemContext(
-        folders,
         namespace,
         types,
-        qos,
         port_connections,
         overrides,
         system_supervision,
@@ -169,7 +167,6 @@ def resolve_system(
         cache(partial(sections_of, files)),
         clock,
         processes_of_nodes(processes),
-        diagnostics,
         SystemLimits(diagnostics),
     )
     nodes = without_sections_of_others(
