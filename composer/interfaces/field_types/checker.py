@@ -110,19 +110,7 @@ class FieldChecker:
             yield Problem(f"{described(found)} cannot be formatted as '{part.format}'", part.span)
 
     def _infer(self, expression: Expression, span: Span) -> tuple[ValueType, list[Problem]]:
-        found, problems_found = infer(expression, self.scope, self.interfaces)
-        # Parts have spans of their own only if the file contains the source literally.
-        is_literal = span.length == len(expression.source)
-        problems = [
-            Problem(
-                problem.message,
-                span.part(problem.offset, problem.length) if is_literal else span,
-                problem.hint,
-                problem.missing,
-            )
-            for problem in problems_found
-        ]
-        return found, problems
+        return infer(expression, span, self.scope, self.interfaces)
 
     def _record(self, record: Record, message: Message) -> Iterator[Problem]:
         for name, content in record.fields:

@@ -10,6 +10,7 @@ from typing import Any
 
 from composer.base.diagnostics import suggestion
 from composer.base.fast_dataclass import dataclass
+from composer.base.source import Span
 from composer.interfaces import FieldType, Interfaces
 from composer.interfaces.field_types.types import (
     ANYTHING,
@@ -18,6 +19,7 @@ from composer.interfaces.field_types.types import (
     NUMBER,
     STRING,
     PathProblem,
+    Problem,
     Scope,
     ValueType,
     Word,
@@ -39,31 +41,35 @@ _CONVERSIONS: Mapping[str, ValueType] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ExpressionProblem:
-    """A problem with a part of an expression; offset and length are in characters."""
-
-    message: str
-    offset: int
-    length: int
-    hint: str | None = None
-    missing: bool = False
-
-
 @dataclass(slots=True)
 class Inference:
-    """The state of the inference for one expression."""
+    """The state of the inference for one expression at ``span``.
+
+    Parts of an expression have spans of their own only if the file contains it literally.
+    """
 
     interfaces: Interfaces
     scope: Scope
-    problems: list[ExpressionProblem] = field(default_factory=list)
+    span: Span
+    is_literal: bool
+    problems: list[Problem] = field(default_factory=list)
+    offsets: list[int] = field(default_factory=list)  # of the problems, in characters
+
+    def report(
+        self, offset: int, length: int, message: str, hint: str | None, *, missing: bool = False
+    ) -> ValueType:
+        """Add a problem with a part of the expression, whose type is unknown then."""
+        span = self.span.part(offset, length) if self.is_literal else self.span
+        self.problems.append(Problem(message, span, hint, missing))
+        self.offsets.append(offset)
+        return ANYTHING
 
 
 def infer(
-    expression: Expression, scope: Scope, interfaces: Interfaces
-) -> tuple[ValueType, list[ExpressionProblem]]:
-    """Return the type of the expression's value, and the problems in the expression."""
-    inference = Inference(interfaces, scope)
+    expression: Expression, span: Span, scope: Scope, interfaces: Interfaces
+) -> tuple[ValueType, list[Problem]]:
+    """Return the type of the value of an expression at ``span``, and the problems in it."""
+    inference = Inference(interfaces, scope, span, span.length == len(expression.source))
     return _infer(expression.tree, inference), inference.problems
 
 
@@ -103,16 +109,11 @@ def _path(node: ast.expr, inference: Inference) -> ValueType:
     if path.root not in inference.scope:
         hint = suggestion(path.root, inference.scope)
         message = f"name '{path.root}' is not available here"
-        inference.problems.append(
-            ExpressionProblem(message, path.offset, len(path.root), hint, missing=True)
-        )
-        return ANYTHING
+        return inference.report(path.offset, len(path.root), message, hint, missing=True)
     found = resolve_path(inference.scope[path.root], path.parts[1:], inference.interfaces)
     if isinstance(found, PathProblem):
-        offset, length = _part(path, found.index + 1)
-        problem = ExpressionProblem(found.message, offset, length, found.hint, missing=True)
-        inference.problems.append(problem)
-        return ANYTHING
+        part = _part(path, found.index + 1)
+        return inference.report(*part, found.message, found.hint, missing=True)
     return found
 
 
@@ -280,10 +281,9 @@ def _report(
 ) -> ValueType:
     end = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
     inside = range(node.col_offset, end)
-    if not any(problem.offset in inside for problem in inference.problems):  # it follows from that
-        found = ExpressionProblem(message, node.col_offset, len(inside), hint)
-        inference.problems.append(found)
-    return ANYTHING
+    if any(offset in inside for offset in inference.offsets):
+        return ANYTHING  # it follows from that
+    return inference.report(node.col_offset, len(inside), message, hint)
 
 
 _RULES: Mapping[type[ast.expr], Callable[[Any, Inference], ValueType]] = {
