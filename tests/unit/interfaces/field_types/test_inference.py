@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from composer.base.source import SourceFile, Span
 from composer.interfaces.field_types.inference import infer
 from composer.interfaces.field_types.types import described
 from composer.language.expressions import FUNCTIONS, compile_expression
@@ -11,11 +12,9 @@ from tests.unit.support.field_types import INTERFACES, SCOPE
 
 
 def inferred(source: str) -> tuple[str, list[str]]:
-    found, problems = infer(compile_expression(source), SCOPE, INTERFACES)
-    marked = [
-        f"{source[item.offset : item.offset + item.length]}: {item.message}" for item in problems
-    ]
-    return described(found), marked
+    span = Span(SourceFile("test.yaml", source), 1, 1, len(source))
+    found, problems = infer(compile_expression(source), span, SCOPE, INTERFACES)
+    return described(found), [f"{item.span.text}: {item.message}" for item in problems]
 
 
 #: By type: expressions of this type, among them one with each function.
