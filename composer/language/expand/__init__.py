@@ -12,6 +12,7 @@ from collections.abc import Mapping as Map
 from typing import NamedTuple
 
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, shown
+from composer.base.source import Span
 from composer.language import rules
 from composer.language.expand.arguments import (
     Scope,
@@ -27,7 +28,7 @@ from composer.language.rules import Stopped, TooManyErrors
 from composer.language.schema import kind_of
 from composer.language.tree import Entry, LeftOut, Mapping, Scalar
 
-__all__ = ["Expanded", "expand", "missing_names"]
+__all__ = ["Expanded", "expand", "missing_names", "missing_values"]
 
 _MAX_CYCLE_NAMES = 8  # maximum number of names in a message
 
@@ -86,6 +87,21 @@ def missing_names(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
         scope.hint(name)
     missing = _without_value(scope, given)
     return () if len(unknown) == len(missing) == 1 else missing
+
+
+def missing_values(
+    tree: Mapping, given: Collection[str], span: Span, owner: str, user: str
+) -> Iterator[Diagnostic]:
+    """Yield a diagnostic at ``span`` for each of the :func:`missing_names`.
+
+    ``owner`` is what the file declares, ``user`` what gives the values.
+    """
+    for name in missing_names(tree, given):
+        scope = read_scope(tree)
+        message = f"{owner} needs a value for its {scope.word} '{shown(name)}'"
+        label = Label(scope.declared[name].key.span, "declared without default")
+        hint = f"add '{scope.section}: {{{shown(name)}: ...}}' to the {user}"
+        yield Diagnostic(rules.MISSING_VARIABLE, message, span, (label,), hint)
 
 
 def _typed(scope: Scope, given: Map[str, Entry]) -> tuple[dict[str, Entry], list[Diagnostic]]:

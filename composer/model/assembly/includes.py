@@ -10,8 +10,8 @@ from pathlib import Path
 from composer.base.diagnostics import Diagnostic, Label, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.language.expand import expand, missing_names
-from composer.language.rules import CYCLE, EMPTY_COLLECTION, MAX_INCLUDE_DEPTH, MISSING_VARIABLE
+from composer.language.expand import expand, missing_values
+from composer.language.rules import CYCLE, EMPTY_COLLECTION, MAX_INCLUDE_DEPTH
 from composer.language.schema import SYSTEM, check_schema, with_intended_sections
 from composer.language.tree import (
     Entry,
@@ -91,7 +91,8 @@ class IncludeResolver:
         self.values += count_values(file.tree) + values
         if self._stack:
             self.limits.count("values", values, self._stack[-1].span)
-            found += _missing(tree, arguments, self._stack[-1].span)
+            span = self._stack[-1].span
+            found += missing_values(tree, arguments, span, "the file", "include")
         found += _without_emptied(check_schema(expanded, SYSTEM), tree)
         self.diagnostics += found
         includes = expanded.get(INCLUDE)
@@ -213,15 +214,6 @@ def _cycle(frames: list[_Frame]) -> Diagnostic:
     cycle = " -> ".join(map(shown, [*paths, paths[0]]))
     labels = tuple(Label(span, "through this") for span in spans[1:])
     return Diagnostic(CYCLE, f"this includes itself: {cycle}", spans[0], labels)
-
-
-def _missing(tree: Mapping, given: dict[str, Entry], span: Span) -> Iterator[Diagnostic]:
-    declared = {entry.name: entry for entry in entries(tree.get("arguments"))}
-    for name in missing_names(tree, given):
-        message = f"the file needs a value for its argument '{shown(name)}'"
-        label = Label(declared[name].key.span, "declared without default")
-        hint = f"add 'arguments: {{{shown(name)}: ...}}' to the include"
-        yield Diagnostic(MISSING_VARIABLE, message, span, (label,), hint)
 
 
 def _without_emptied(found: list[Diagnostic], written: Mapping) -> Iterator[Diagnostic]:

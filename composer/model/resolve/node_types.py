@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import field
 from pathlib import Path
 
-from composer.base.diagnostics import Diagnostic, Label, has_errors, shown
+from composer.base.diagnostics import Diagnostic, has_errors, shown
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Located, Span
-from composer.language.expand import expand, missing_names
-from composer.language.rules import MISSING_VARIABLE
+from composer.language.expand import expand, missing_values
 from composer.language.schema import NODE, check_schema
 from composer.language.tree import Entry, Mapping, Plain, Tree, entries, plain
 from composer.model.assembly import Inherited, inherit, read_node_type
@@ -67,7 +65,9 @@ class NodeTypeLoader:
             return None
         given = {entry.name: entry for entry in entries(variables)}
         if variables is None or isinstance(variables, Mapping):
-            self.diagnostics.extend(_missing(written.tree, given, span))
+            named = written.tree.get("node")
+            owner = f"node type '{'' if named is None else shown(str(plain(named)))}'"
+            self.diagnostics.extend(missing_values(written.tree, given, span, owner, "node"))
         if given:
             # Not shared: values of arguments have the location of the argument.
             return self._instantiate(path, written, written.tree, given)
@@ -111,17 +111,3 @@ class NodeTypeLoader:
         inherited = inherit(file)
         self.diagnostics.extend(inherited.diagnostics)
         return inherited
-
-
-def _missing(tree: Mapping, given: dict[str, Entry], span: Span) -> Iterator[Diagnostic]:
-    declared = {entry.name: entry for entry in entries(tree.get("variables"))}
-    owner = tree.get("node")
-    name = shown(str(plain(owner))) if owner is not None else ""
-    for variable in missing_names(tree, given):
-        yield Diagnostic(
-            MISSING_VARIABLE,
-            f"node type '{name}' needs a value for its variable '{shown(variable)}'",
-            span,
-            (Label(declared[variable].key.span, "declared without default"),),
-            f"add 'variables: {{{shown(variable)}: ...}}' to the node",
-        )
