@@ -4,35 +4,36 @@ from __future__ import annotations
 
 from enum import Enum
 
+from composer.base.diagnostics import error, info, warning
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 
 
 class Family(Enum):
-    """The families of problems, with the names of their rules."""
+    """The families of problems, each with its rule."""
 
-    PORT = "unknown-attribute"
-    FIELD = "unknown-field"
-    VALUE = "invalid-value"
-    MESSAGE_TYPE = "wrong-message-type"
-    AWAIT = "missing-await"
-    NAME = "undefined-name"
-    IMPORT = "unknown-import"
-    NOT_INSTALLED = "not-installed"
-    ATTRIBUTE = "missing-attribute"
-    ARGUMENTS = "call-arguments"
-    TYPE = "type-error"
-    RETURN = "missing-return"
-    NONE = "unchecked-none"
-    ASYNCIO = "asyncio-call"
-    EARLY = "too-early"
-    FRAME = "frame-id-slash"
-    SIGNATURE = "handler-signature"
-    PARAMETER = "undeclared-parameter"
-    CONSTRUCTOR = "missing-constructor"
-    SELF = "missing-self"
-    SYNTAX = "python-syntax"
-    NOT_CHECKED = "not-checked"
+    PORT = error("RC442", "unknown-attribute")
+    FIELD = error("RC304", "unknown-field")
+    VALUE = error("RC305", "invalid-value")
+    MESSAGE_TYPE = error("RC457", "wrong-message-type")
+    AWAIT = error("RC443", "missing-await")
+    NAME = warning("RC447", "undefined-name")
+    IMPORT = error("RC444", "unknown-import")
+    NOT_INSTALLED = info("RC445", "not-installed")
+    ATTRIBUTE = warning("RC458", "missing-attribute")
+    ARGUMENTS = warning("RC452", "call-arguments")
+    TYPE = warning("RC455", "type-error")
+    RETURN = error("RC448", "missing-return")
+    NONE = warning("RC456", "unchecked-none")
+    ASYNCIO = error("RC454", "asyncio-call")
+    EARLY = warning("RC459", "too-early")
+    FRAME = warning("RC309", "frame-id-slash")
+    SIGNATURE = error("RC435", "handler-signature")
+    PARAMETER = error("RC483", "undeclared-parameter")
+    CONSTRUCTOR = error("RC484", "missing-constructor")
+    SELF = error("RC449", "missing-self")
+    SYNTAX = error("RC441", "python-syntax")
+    NOT_CHECKED = info("RC437", "not-checked")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from composer.base.source import Span
 from composer.model import Node, PortKind
 from composer.python_code.lookup import BehaviorSource
 from composer.python_code.nodes import GENERAL_HANDLERS, Handler, handlers, reached_methods
+from composer.python_code.problems import Family
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method, scopes_in
 from composer.python_code.trees import (
@@ -27,11 +28,11 @@ from composer.python_code.trees import (
 from composer.rules.analysis.context import Context, behaviors, distinct_behaviors
 from composer.rules.analysis.formatting import a
 from composer.rules.analysis.subjects import wiring
-from composer.rules.python import CLASS_MISSING, WRONG_MESSAGE_TYPE, as_warning, missing, unnamed
+from composer.rules.python import CLASS_MISSING, as_warning, missing, unnamed
 
 MISSING_HANDLER = error("RC433", "missing-handler")
 HANDLER_WITHOUT_PORT = error("RC434", "handler-without-port")
-HANDLER_SIGNATURE = error("RC435", "handler-signature")
+HANDLER_SIGNATURE = Family.SIGNATURE.value
 BLOCKING_CALL = warning("RC436", "blocking-call")
 WRONG_CLASS = error("RC462", "wrong-class")
 
@@ -173,7 +174,7 @@ def _annotations(node: Node, source: BehaviorSource) -> Iterator[Diagnostic]:
             label = Label(source.reference.text.span, "the behavior of this node")
             span = span_of(annotation, scope.source)
             given = (("type", f"{node.name}.{_stem(name)}"),)
-            rule = as_warning(WRONG_MESSAGE_TYPE)
+            rule = as_warning(Family.MESSAGE_TYPE.value)
             yield Diagnostic(rule, message, span, (label,), relies_on=given)
 
 

@@ -23,6 +23,7 @@ from composer.model import (
 from composer.model.dependencies import dependency_edges
 from composer.model.qos import incompatibilities
 from composer.python_code.nodes import declared_parameters
+from composer.python_code.problems import Family
 from composer.python_code.scopes import Call
 from composer.python_code.syntax import Method
 from composer.python_code.trees import SCOPES, is_none, span_of, walk
@@ -35,7 +36,7 @@ from composer.rules.analysis.class_ports import (
 from composer.rules.analysis.context import ClassOfNode, Context, distinct_classes, hosted_classes
 from composer.rules.analysis.subjects import type_subject
 from composer.rules.behaviors import BLOCKING_CALL, WRONG_CLASS
-from composer.rules.python import NOT_INSTALLED, as_warning, missing, unnamed
+from composer.rules.python import as_warning, missing, unnamed
 
 CLASS_ARGUMENTS = error("RC463", "class-arguments")
 UNSUPPORTED_CLASS = error("RC464", "unsupported-class")
@@ -75,7 +76,7 @@ def check_classes(context: Context) -> Iterator[Diagnostic]:
             yield from unnamed(node.hosted_class.reference, "class")
     for item in hosted_classes(context):
         source = item.source
-        yield from missing(source, NOT_INSTALLED)
+        yield from missing(source, Family.NOT_INSTALLED.value)
         if source.complete and source.class_span is not None and not source.is_rclpy_node:
             message = f"class '{source.reference.class_name}' is not derived from rclpy's Node"
             hint = "for a class without ROS, write 'behavior' instead of 'class'"

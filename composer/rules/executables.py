@@ -27,12 +27,13 @@ from composer.project.executables import (
     has_package,
     has_ros_packages,
 )
+from composer.python_code.problems import Family
 from composer.rules.analysis.context import Context, is_unresolved, limited
 from composer.rules.analysis.subjects import is_misspelled
 from composer.rules.implementations import SETTING_WITHOUT_EFFECT
 from composer.rules.processes import CONFLICTING_PROCESS
-from composer.rules.python import NOT_INSTALLED
 
+NOT_INSTALLED = Family.NOT_INSTALLED.value
 INVALID_EXECUTABLE = error("RC473", "invalid-executable")
 
 #: Arguments with these suffixes are files, and are looked for.

@@ -13,6 +13,7 @@ from composer.interfaces.field_types.types import constant_problem, enumerator_p
 from composer.language.expressions import FieldPath
 from composer.language.templates import Constant, Items, Record, Template
 from composer.model import Node
+from composer.python_code.problems import Family
 from composer.rules.analysis.context import Context, part_of_path
 from composer.rules.analysis.expressions import (
     EVENT_NAMES,
@@ -26,8 +27,8 @@ from composer.rules.types import certain_field_problems
 
 UNKNOWN_NAME = error("RC209", "unknown-name")
 INDEX_OUT_OF_RANGE = warning("RC308", "index-out-of-range")
-UNKNOWN_FIELD = error("RC304", "unknown-field")
-INVALID_VALUE = error("RC305", "invalid-value")
+UNKNOWN_FIELD = Family.FIELD.value
+INVALID_VALUE = Family.VALUE.value
 UNKNOWN_ENUMERATOR = warning("RC306", "unknown-enumerator")
 #: Maximum number of further uses of a variable to show.
 _SHOWN_USES = 3

@@ -11,7 +11,6 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
-from functools import cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.base.diagnostics import (
@@ -21,10 +20,7 @@ from composer.base.diagnostics import (
     Severity,
     Subject,
     error,
-    info,
-    registered_rules,
     suggestion,
-    warning,
 )
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
@@ -51,24 +47,6 @@ if TYPE_CHECKING:
 
 
 CLASS_MISSING = error("RC460", "class-missing")
-UNKNOWN_IMPORT = error("RC444", "unknown-import")
-NOT_INSTALLED = info("RC445", "not-installed")
-UNDEFINED_NAME = warning("RC447", "undefined-name")
-CALL_ARGUMENTS = warning("RC452", "call-arguments")
-TYPE_ERROR = warning("RC455", "type-error")
-MISSING_SELF = error("RC449", "missing-self")
-NOT_CHECKED = info("RC437", "not-checked")
-PYTHON_SYNTAX = error("RC441", "python-syntax")
-UNKNOWN_ATTRIBUTE = error("RC442", "unknown-attribute")
-MISSING_ATTRIBUTE = warning("RC458", "missing-attribute")
-WRONG_MESSAGE_TYPE = error("RC457", "wrong-message-type")
-MISSING_RETURN = error("RC448", "missing-return")
-MISSING_AWAIT = error("RC443", "missing-await")
-ASYNCIO_CALL = error("RC454", "asyncio-call")
-UNCHECKED_NONE = warning("RC456", "unchecked-none")
-TOO_EARLY = warning("RC459", "too-early")
-UNDECLARED_PARAMETER = error("RC483", "undeclared-parameter")
-MISSING_CONSTRUCTOR = error("RC484", "missing-constructor")
 
 #: What a family takes for right: the ports and parameters of YAML, or a folder of the project.
 _RELIES_ON: Mapping[Family, tuple[str, ...]] = {
@@ -97,7 +75,7 @@ def diagnostic(
 
     In a class nothing but its syntax is an error: it may run as it does today.
     """
-    rule = _rules()[problem.family.value]
+    rule = problem.family.value
     what = "class" if node.behavior is None else "behavior"
     is_error = (what == "behavior" and problem.is_certain) or problem.family is Family.SYNTAX
     if rule.severity is Severity.ERROR and not is_error:
@@ -141,12 +119,6 @@ def _relies_on(problem: Problem, node: Node, source: BehaviorSource) -> Iterator
 def _contains(method: Method, line: int) -> bool:
     node = method.node
     return node is not None and node.lineno <= line <= (node.end_lineno or node.lineno)
-
-
-@cache
-def _rules() -> Mapping[str, Rule]:
-    """Return all rules by name."""
-    return {rule.name: rule for rule in registered_rules()}
 
 
 def check_python(context: Context) -> Iterator[Diagnostic]:

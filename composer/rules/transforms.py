@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.diagnostics import Diagnostic, Label, error, suggestion
 from composer.base.source import Located, Span
 from composer.language.templates import Constant, Items, Record, Template, Text
 from composer.model import (
@@ -18,6 +18,7 @@ from composer.model import (
     Transforms,
 )
 from composer.model.transforms import is_unit, normalized
+from composer.python_code.problems import Family
 from composer.rules.analysis.context import Context, is_unresolved
 from composer.rules.analysis.expressions import message_templates
 from composer.rules.analysis.formatting import number
@@ -25,7 +26,7 @@ from composer.rules.analysis.frames import BROADCAST, FrameUse, place, uses_of_b
 from composer.rules.analysis.subjects import earlier_errors
 from composer.rules.timing import UNLIKELY_UNIT
 
-FRAME_ID_SLASH = warning("RC309", "frame-id-slash")
+FRAME_ID_SLASH = Family.FRAME.value
 TRANSFORM_SOURCE = error("RC515", "transform-source")
 INVALID_QUATERNION = error("RC516", "invalid-quaternion")
 UNDECLARED_TRANSFORM = error("RC517", "undeclared-transform")
