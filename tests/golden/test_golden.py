@@ -15,6 +15,7 @@ from composer.base.diagnostics import Rule
 from composer.base.folders import systems_folder
 from composer.loading import load, load_files
 from composer.plan import bring_up, tear_down
+from composer.python_code.problems import Family
 from composer.report.text import render
 from composer.rules import all_checks
 
@@ -67,6 +68,7 @@ def test_every_check_has_a_report() -> None:
     rules = [item for module in modules for item in vars(module).values() if isinstance(item, Rule)]
     # RC214 needs a folder outside of a project: tests/unit/rules/test_examples.py. RC307 needs an
     # installed package: tests/unit/rules/test_projects.py. RC437 needs another Python.
+    rules += [family.value for family in Family]
     assert all_checks()
     assert {rule.code for rule in rules} - reported == {"RC214", "RC307", "RC437"}
 

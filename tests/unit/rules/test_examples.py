@@ -8,6 +8,7 @@ import runpy
 from pathlib import Path
 
 from composer.base.diagnostics import Rule
+from composer.python_code.problems import Family
 from composer.report.rules import all_rules, explain, find_rule, page_of
 from composer.rules import all_checks
 from tests.unit.support.checking import diagnostics_of_each
@@ -50,6 +51,7 @@ def test_all_checks_have_tested_examples() -> None:
     # (test_projects.py), RC437 an old Python (test_checker_limits.py).
     modules = [inspect.unwrap(check).__globals__.values() for check in all_checks()]
     known = {item.code for names in modules for item in names if isinstance(item, Rule)}
+    known |= {family.value.code for family in Family}
     assert known - run == {"RC001", "RC307", "RC437"}
 
 
