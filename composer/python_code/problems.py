@@ -7,14 +7,15 @@ from enum import Enum
 from composer.base.diagnostics import error, info, warning
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
+from composer.interfaces.field_types.types import INVALID_VALUE, UNKNOWN_FIELD
 
 
 class Family(Enum):
     """The families of problems, each with its rule."""
 
     PORT = error("RC442", "unknown-attribute")
-    FIELD = error("RC304", "unknown-field")
-    VALUE = error("RC305", "invalid-value")
+    FIELD = UNKNOWN_FIELD
+    VALUE = INVALID_VALUE
     MESSAGE_TYPE = error("RC457", "wrong-message-type")
     AWAIT = error("RC443", "missing-await")
     NAME = warning("RC447", "undefined-name")

@@ -7,13 +7,17 @@ from collections.abc import Iterator
 
 from composer.base.characters import counted
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
+from composer.base.fast_dataclass import replace
 from composer.base.source import Span
 from composer.interfaces import Interfaces, Message
-from composer.interfaces.field_types.types import constant_problem, enumerator_problem
+from composer.interfaces.field_types.types import (
+    UNKNOWN_FIELD,
+    constant_problem,
+    enumerator_problem,
+)
 from composer.language.expressions import FieldPath
 from composer.language.templates import Constant, Items, Record, Template
 from composer.model import Node
-from composer.python_code.problems import Family
 from composer.rules.analysis.context import Context, part_of_path
 from composer.rules.analysis.expressions import (
     EVENT_NAMES,
@@ -27,8 +31,6 @@ from composer.rules.types import certain_field_problems
 
 UNKNOWN_NAME = error("RC209", "unknown-name")
 INDEX_OUT_OF_RANGE = warning("RC308", "index-out-of-range")
-UNKNOWN_FIELD = Family.FIELD.value
-INVALID_VALUE = Family.VALUE.value
 UNKNOWN_ENUMERATOR = warning("RC306", "unknown-enumerator")
 #: Maximum number of further uses of a variable to show.
 _SHOWN_USES = 3
@@ -120,31 +122,14 @@ def _out_of_range(site: ExpressionSite, path: FieldPath) -> Iterator[Diagnostic]
         )
 
 
-def check_unknown_field(context: Context) -> Iterator[Diagnostic]:
-    """Report the fields in YAML that do not exist."""
+def check_field(context: Context) -> Iterator[Diagnostic]:
+    """Report the fields in YAML that do not exist, and the values that do not fit."""
     for problem in certain_field_problems(context):
-        if problem.missing:
-            yield Diagnostic(
-                UNKNOWN_FIELD,
-                problem.message,
-                problem.span,
-                hint=problem.hint,
-                subjects=(("field", problem.message),),
-            )
-
-
-def check_invalid_value(context: Context) -> Iterator[Diagnostic]:
-    """Report the values in YAML that do not fit."""
-    for problem in certain_field_problems(context):
-        if not problem.missing:
-            names = re.findall(r"\bparameters\.(\w+)", problem.span.text)
-            yield Diagnostic(
-                INVALID_VALUE,
-                problem.message,
-                problem.span,
-                hint=problem.hint,
-                relies_on=tuple(("parameter", name) for name in names),
-            )
+        if problem.rule is UNKNOWN_FIELD:
+            yield replace(problem, subjects=(("field", problem.message),))
+        else:
+            names = re.findall(r"\bparameters\.(\w+)", problem.primary.text)
+            yield replace(problem, relies_on=tuple(("parameter", name) for name in names))
 
 
 def check_unknown_enumerator(context: Context) -> Iterator[Diagnostic]:

@@ -10,7 +10,7 @@ from composer.base.diagnostics import Diagnostic, Label, suggestion
 from composer.base.source import Located, Span
 from composer.interfaces import Message
 from composer.interfaces.field_types.checker import FieldChecker
-from composer.interfaces.field_types.types import NUMBER, STATUS, Problem, ValueType
+from composer.interfaces.field_types.types import NUMBER, STATUS, ValueType
 from composer.language.expressions import Expression
 from composer.language.rules import KEYS_EXCLUDE_EACH_OTHER, OUT_OF_RANGE, UNKNOWN_KEY
 from composer.language.templates import Template, expressions_in
@@ -30,7 +30,7 @@ from composer.python_code.nodes import handlers
 from composer.rules.analysis.context import Context, part_of_path
 from composer.rules.analysis.parameters import KNOWN_TYPES, range_problem, type_problem
 from composer.rules.connections import no_node
-from composer.rules.expressions import INVALID_VALUE, UNKNOWN_FIELD, UNKNOWN_NAME
+from composer.rules.expressions import UNKNOWN_NAME
 from composer.rules.implementations import SETTING_WITHOUT_EFFECT
 from composer.rules.parameter_values import PARAMETER_VALUE
 from composer.rules.parameters import UNKNOWN_PARAMETER
@@ -263,7 +263,7 @@ def _event(context: Context, event: Condition, channel: Channel) -> Iterator[Dia
         names = list(_names(where, span, scope))
         yield from names
         if not names:
-            yield from _reported(FieldChecker(context.interfaces, scope).condition(where, span))
+            yield from FieldChecker(context.interfaces, scope).condition(where, span)
     if event.fields is not None:
         yield from _template(context, event.fields, received, _NOW)
 
@@ -278,7 +278,7 @@ def _template(
     ]
     yield from names
     if message is not None and not names:
-        yield from _reported(FieldChecker(context.interfaces, scope).template(content, message))
+        yield from FieldChecker(context.interfaces, scope).template(content, message)
 
 
 def _names(expression: Expression, span: Span, scope: dict[str, ValueType]) -> Iterator[Diagnostic]:
@@ -288,12 +288,6 @@ def _names(expression: Expression, span: Span, scope: dict[str, ValueType]) -> I
             message = f"name '{path.root}' is not available here"
             hint = suggestion(path.root, scope)
             yield Diagnostic(UNKNOWN_NAME, message, place, hint=hint)
-
-
-def _reported(problems: Iterator[Problem]) -> Iterator[Diagnostic]:
-    for problem in problems:
-        rule = UNKNOWN_FIELD if problem.missing else INVALID_VALUE
-        yield Diagnostic(rule, problem.message, problem.span, hint=problem.hint)
 
 
 def _parameter(system: System, name: Located[str], value: Located[Plain]) -> Iterator[Diagnostic]:

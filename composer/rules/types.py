@@ -9,7 +9,6 @@ from dataclasses import replace
 from composer.base.diagnostics import Diagnostic, Label, Subject, error
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.interfaces.field_types.types import Problem
 from composer.model import Channel, Connection, Endpoint, PortOfNode
 from composer.model.names import join
 from composer.rules.analysis.context import Context
@@ -38,7 +37,7 @@ def type_mismatches(context: Context) -> tuple[TypeMismatch, ...]:
     return tuple(_mismatches(context))
 
 
-def certain_field_problems(context: Context) -> Iterator[Problem]:
+def certain_field_problems(context: Context) -> Iterator[Diagnostic]:
     """Yield the problems with fields, except of ports whose type is probably wrong."""
     doubtful = {
         endpoint.key

@@ -11,7 +11,7 @@ Example::
     yield from checker.condition(expression, span)          # when, accept: true or false
     yield from checker.expression(expression, span)         # anything else
 
-Each yields ``Problem(message, span, hint)``. A scope maps the names that an expression can use to
+Each yields diagnostics. A scope maps the names that an expression can use to
 their types: a ``Message``, a ``FieldType``, a map of names to types, or ``ANYTHING`` if the type is
 unknown. Unknown types never cause a problem, and one mistake causes one problem.
 """

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from composer.base.diagnostics import nearest, suggestion
+from composer.base.diagnostics import Diagnostic, nearest, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import FieldType, Interfaces, Message
@@ -14,7 +14,6 @@ from composer.interfaces.field_types.inference import infer, literal_integer
 from composer.interfaces.field_types.types import (
     ANYTHING,
     STRING,
-    Problem,
     Scope,
     ValueType,
     constant_problem,
@@ -26,6 +25,7 @@ from composer.interfaces.field_types.types import (
     is_number,
     is_seconds,
     is_string,
+    problem_at,
     type_of,
 )
 from composer.language.expressions import Expression
@@ -39,7 +39,7 @@ class FieldChecker:
     interfaces: Interfaces
     scope: Scope
 
-    def template(self, template: Template, message: Message) -> Iterator[Problem]:
+    def template(self, template: Template, message: Message) -> Iterator[Diagnostic]:
         """Yield the problems of filling ``message`` from ``template``."""
         match template:
             case Record():
@@ -51,9 +51,9 @@ class FieldChecker:
             case Constant() | Text() | Items():
                 names = ", ".join(message.field_names) or "none"
                 problem = f"{message.name} must be a map of its fields"
-                yield Problem(problem, template.span, f"fields: {names}")
+                yield problem_at(template.span, problem, f"fields: {names}")
 
-    def text(self, template: Template) -> Iterator[Problem]:
+    def text(self, template: Template) -> Iterator[Diagnostic]:
         """Yield the problems of the expressions in a template of any type."""
         match template:
             case Computed(expression=expression, span=span):
@@ -83,56 +83,58 @@ class FieldChecker:
             case Items():
                 return ANYTHING
 
-    def condition(self, expression: Expression, span: Span) -> Iterator[Problem]:
+    def condition(self, expression: Expression, span: Span) -> Iterator[Diagnostic]:
         """Yield the problems of an expression that must be a bool."""
         found, problems = self._infer(expression, span)
         yield from problems
         if found is not ANYTHING and not is_bool(found):
             message = f"a condition must be a bool, not {described(found)}"
             hint = "compare it, as in '... > 0'" if is_number(found) else None
-            yield Problem(message, span, hint)
+            yield problem_at(span, message, hint)
 
-    def number(self, expression: Expression, span: Span) -> Iterator[Problem]:
+    def number(self, expression: Expression, span: Span) -> Iterator[Diagnostic]:
         """Yield the problems of an expression that must be a number."""
         found, problems = self._infer(expression, span)
         yield from problems
         if found is not ANYTHING and not is_number(found):
-            yield Problem(f"{described(found)} where a number is expected", span)
+            yield problem_at(span, f"{described(found)} where a number is expected")
 
-    def expression(self, expression: Expression, span: Span) -> Iterator[Problem]:
+    def expression(self, expression: Expression, span: Span) -> Iterator[Diagnostic]:
         """Yield the problems of an expression."""
         yield from self._infer(expression, span)[1]
 
-    def _formatted(self, part: Formatted) -> Iterator[Problem]:
+    def _formatted(self, part: Formatted) -> Iterator[Diagnostic]:
         found, problems = self._infer(part.expression, part.span)
         yield from problems
         if part.format and not _can_format(found, part.format):
-            yield Problem(f"{described(found)} cannot be formatted as '{part.format}'", part.span)
+            yield problem_at(
+                part.span, f"{described(found)} cannot be formatted as '{part.format}'"
+            )
 
-    def _infer(self, expression: Expression, span: Span) -> tuple[ValueType, list[Problem]]:
+    def _infer(self, expression: Expression, span: Span) -> tuple[ValueType, list[Diagnostic]]:
         return infer(expression, span, self.scope, self.interfaces)
 
-    def _record(self, record: Record, message: Message) -> Iterator[Problem]:
+    def _record(self, record: Record, message: Message) -> Iterator[Diagnostic]:
         for name, content in record.fields:
             field = message.field(name.value)
             if field is None:
                 problem = f"{message.name} has no field '{name.value}'"
                 hint = suggestion(name.value, message.field_names)
-                yield Problem(problem, name.span, hint, missing=True)
+                yield problem_at(name.span, problem, hint, missing=True)
                 yield from self.text(content)
             else:
                 for found in self._field(content, field.type):
                     hint = found.hint or _named_value(content, message, name.value)
                     yield replace(found, hint=hint)
 
-    def _field(self, template: Template, type_: FieldType) -> Iterator[Problem]:
+    def _field(self, template: Template, type_: FieldType) -> Iterator[Diagnostic]:
         match template:
             case Constant(value=str() as text) if "${" in text:
                 return
             case Constant(value=value, span=span):
                 problem = constant_problem(value, type_, self.interfaces)
                 if problem is not None:
-                    yield Problem(problem[0], span, problem[1])
+                    yield problem_at(span, problem[0], problem[1])
             case Computed(expression=expression, span=span):
                 number = literal_integer(expression) if is_integer(type_) else None
                 if number is not None:
@@ -146,35 +148,35 @@ class FieldChecker:
             case Items():
                 yield from self._items(template, type_)
 
-    def _text(self, text: Text, type_: FieldType) -> Iterator[Problem]:
+    def _text(self, text: Text, type_: FieldType) -> Iterator[Diagnostic]:
         yield from self.text(text)
         if not is_string(type_):
             hint = 'write a single expression: "{...}"'
-            yield Problem(f"a string where {type_} is expected", text.span, hint)
+            yield problem_at(text.span, f"a string where {type_} is expected", hint)
         least = sum(len(part) for part in text.parts if isinstance(part, str))
         if type_.string_bound is not None and least > type_.string_bound:
             message = f"a string of at least {least} characters does not fit {type_}"
-            yield Problem(message, text.span)
+            yield problem_at(text.span, message)
 
-    def _nested(self, record: Record, type_: FieldType, span: Span) -> Iterator[Problem]:
+    def _nested(self, record: Record, type_: FieldType, span: Span) -> Iterator[Diagnostic]:
         if type_.is_primitive or type_.is_array:
             yield from self.text(record)
-            yield Problem(f"a map of fields where {type_} is expected", span)
+            yield problem_at(span, f"a map of fields where {type_} is expected")
             return
         message = self.interfaces.message(type_.name)
         if message is not None:
             yield from self._record(record, message)
 
-    def _items(self, items: Items, type_: FieldType) -> Iterator[Problem]:
+    def _items(self, items: Items, type_: FieldType) -> Iterator[Diagnostic]:
         if not type_.is_array:
             yield from self.text(items)
-            yield Problem(f"a list where {type_} is expected", items.span)
+            yield problem_at(items.span, f"a list where {type_} is expected")
             return
         count = len(items.items)
         if type_.array_size not in (None, count) or (
             type_.array_bound is not None and count > type_.array_bound
         ):
-            yield Problem(f"a list of {count} elements does not fit {type_}", items.span)
+            yield problem_at(items.span, f"a list of {count} elements does not fit {type_}")
         found = [list(self._field(item, type_.element)) for item in items.items]
         if len(found) > 1 and all(found) and all(isinstance(i, Constant) for i in items.items):
             first = found[0][0]  # the type of the field is not the one that the list is for
@@ -184,12 +186,12 @@ class FieldChecker:
 
     def _computed(
         self, expression: Expression, span: Span, target: FieldType | Message
-    ) -> Iterator[Problem]:
+    ) -> Iterator[Diagnostic]:
         found, problems = self._infer(expression, span)
         yield from problems
         if not problems and not self.fits(found, target):
             problem = f"{described(found)} where {described(target)} is expected"
-            yield Problem(problem, span, _conversion_hint(expression, found, target))
+            yield problem_at(span, problem, _conversion_hint(expression, found, target))
 
     def fits(self, found: ValueType, target: FieldType | Message) -> bool:
         """Return whether values of type ``found`` can be assigned to ``target``."""

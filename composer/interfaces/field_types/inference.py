@@ -8,7 +8,7 @@ from dataclasses import field
 from itertools import pairwise
 from typing import Any
 
-from composer.base.diagnostics import suggestion
+from composer.base.diagnostics import Diagnostic, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import FieldType, Interfaces
@@ -19,7 +19,6 @@ from composer.interfaces.field_types.types import (
     NUMBER,
     STRING,
     PathProblem,
-    Problem,
     Scope,
     ValueType,
     Word,
@@ -29,6 +28,7 @@ from composer.interfaces.field_types.types import (
     is_integer,
     is_number,
     is_string,
+    problem_at,
     resolve_path,
 )
 from composer.language.expressions import CONSTANTS, Expression, FieldPath, path_of
@@ -52,7 +52,7 @@ class Inference:
     scope: Scope
     span: Span
     is_literal: bool
-    problems: list[Problem] = field(default_factory=list)
+    problems: list[Diagnostic] = field(default_factory=list)
     offsets: list[int] = field(default_factory=list)  # of the problems, in characters
 
     def report(
@@ -60,14 +60,14 @@ class Inference:
     ) -> ValueType:
         """Add a problem with a part of the expression, whose type is unknown then."""
         span = self.span.part(offset, length) if self.is_literal else self.span
-        self.problems.append(Problem(message, span, hint, missing))
+        self.problems.append(problem_at(span, message, hint, missing=missing))
         self.offsets.append(offset)
         return ANYTHING
 
 
 def infer(
     expression: Expression, span: Span, scope: Scope, interfaces: Interfaces
-) -> tuple[ValueType, list[Problem]]:
+) -> tuple[ValueType, list[Diagnostic]]:
     """Return the type of the value of an expression at ``span``, and the problems in it."""
     inference = Inference(interfaces, scope, span, span.length == len(expression.source))
     return _infer(expression.tree, inference), inference.problems

@@ -7,13 +7,15 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import TypeAlias
 
-from composer.base.diagnostics import shown, suggestion
+from composer.base.diagnostics import Diagnostic, error, shown, suggestion
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import FLOATS, INTEGER_RANGES, TEXTS, FieldType, Interfaces, Message
 from composer.language.expressions import map_key
 from composer.language.tree import Plain, ScalarValue
 
+UNKNOWN_FIELD = error("RC304", "unknown-field")
+INVALID_VALUE = error("RC305", "invalid-value")
 BOOL = FieldType("bool")
 INTEGER = FieldType("int64")
 NUMBER = FieldType("float64")
@@ -66,18 +68,15 @@ class Word(FieldType):
 STATUS = Word("string", words=("succeeded", "canceled", "aborted"))
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A problem, its span and a hint.
+def problem_at(
+    span: Span, message: str, hint: str | None = None, *, missing: bool = False
+) -> Diagnostic:
+    """Return a problem: ``missing`` for a field or element that does not exist.
 
-    ``missing`` is true for a field or element that does not exist, false for a value that does not
-    fit.
+    Otherwise, it is about a value that does not fit.
     """
-
-    message: str
-    span: Span
-    hint: str | None = None
-    missing: bool = False
+    rule = UNKNOWN_FIELD if missing else INVALID_VALUE
+    return Diagnostic(rule, message, span, hint=hint)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from composer.base.diagnostics import Diagnostic
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
 from composer.interfaces import Message
@@ -16,7 +17,7 @@ from composer.interfaces.field_types.types import (
     NUMBER,
     STATUS,
     STRING,
-    Problem,
+    UNKNOWN_FIELD,
     ValueType,
     constant_problem,
     described,
@@ -24,6 +25,7 @@ from composer.interfaces.field_types.types import (
     is_number,
     is_string,
     parameter_type,
+    problem_at,
     type_of,
 )
 from composer.language.expressions import Expression
@@ -188,7 +190,7 @@ class _NameTypes(dict[str, ValueType]):
 class FieldProblem:
     """A problem, and the port whose type it depends on, as node and port."""
 
-    problem: Problem
+    problem: Diagnostic
     port: tuple[str, str] | None = None
 
 
@@ -225,7 +227,7 @@ def _problems(context: Context) -> Iterator[FieldProblem]:
 
 def _period(
     expression: Expression, timer: Timer, node: Node, checker: FieldChecker
-) -> Iterator[Problem]:
+) -> Iterator[Diagnostic]:
     """Check an expression that must be a number, or a string that contains one."""
     problems = list(checker.number(expression, timer.period.span))
     try:
@@ -233,7 +235,7 @@ def _period(
     except PeriodError:
         yield from problems
     else:
-        yield from (problem for problem in problems if problem.missing)
+        yield from (problem for problem in problems if problem.rule is UNKNOWN_FIELD)
 
 
 def _state_types(node: Node) -> _NameTypes:
@@ -265,7 +267,7 @@ def _scope(context: Context, names: _NameTypes, event: Event, port: Port | None)
 
 def _reaction(
     context: Context, checker: FieldChecker, site: ReactionSite, states: _NameTypes
-) -> Iterator[Problem]:
+) -> Iterator[Diagnostic]:
     reaction = site.reaction
     if reaction.when is not None:
         yield from checker.condition(reaction.when.value, reaction.when.span)
@@ -279,7 +281,7 @@ def _reaction(
         yield from _filled(checker, reaction.respond, response)
 
 
-def _state(content: Template, initial: ValueType, checker: FieldChecker) -> Iterator[Problem]:
+def _state(content: Template, initial: ValueType, checker: FieldChecker) -> Iterator[Diagnostic]:
     """Compare a new value with the initial value of its state variable."""
     expected = NUMBER if initial == INTEGER else initial
     if expected not in (BOOL, NUMBER, STRING):
@@ -298,7 +300,7 @@ def _state(content: Template, initial: ValueType, checker: FieldChecker) -> Iter
         message, hint = "" if fits else f"{described(found)} where {expected} is expected", None
     if message:
         message = message.replace(f"where {expected} is", f"where a {kind} is")
-        yield Problem(f"{message}, as the initial value is one", content.span, hint)
+        yield problem_at(content.span, f"{message}, as the initial value is one", hint)
 
 
 def _sends(
@@ -311,11 +313,13 @@ def _sends(
             yield FieldProblem(problem, at)
 
 
-def _filled(checker: FieldChecker, content: Template, message: Message | None) -> Iterator[Problem]:
+def _filled(
+    checker: FieldChecker, content: Template, message: Message | None
+) -> Iterator[Diagnostic]:
     return checker.text(content) if message is None else checker.template(content, message)
 
 
-def _action_server(context: Context, checker: FieldChecker, port: Port) -> Iterator[Problem]:
+def _action_server(context: Context, checker: FieldChecker, port: Port) -> Iterator[Diagnostic]:
     if port.accept is not None:
         yield from checker.condition(port.accept.value, port.accept.span)
     messages = context.messages(port)
