@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from composer.base.diagnostics import Diagnostic
 from composer.base.source import SourceFile, Span
 from composer.interfaces import Field, FieldType, Interfaces, Message
 from composer.interfaces.field_types.checker import FieldChecker
@@ -9,7 +10,6 @@ from composer.interfaces.field_types.types import (
     INTEGER,
     NUMBER,
     STRING,
-    Problem,
     Scope,
     parameter_type,
     type_of,
@@ -95,5 +95,5 @@ def template(value: object) -> Template:
     return compiled
 
 
-def problems_of(value: object, message: Message = EVERYTHING) -> list[Problem]:
+def problems_of(value: object, message: Message = EVERYTHING) -> list[Diagnostic]:
     return list(CHECKER.template(template(value), message))

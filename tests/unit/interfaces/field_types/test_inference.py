@@ -14,7 +14,7 @@ from tests.unit.support.field_types import INTERFACES, SCOPE
 def inferred(source: str) -> tuple[str, list[str]]:
     span = Span(SourceFile("test.yaml", source), 1, 1, len(source))
     found, problems = infer(compile_expression(source), span, SCOPE, INTERFACES)
-    return described(found), [f"{item.span.text}: {item.message}" for item in problems]
+    return described(found), [f"{item.primary.text}: {item.message}" for item in problems]
 
 
 #: By type: expressions of this type, among them one with each function.

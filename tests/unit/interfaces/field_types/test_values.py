@@ -166,8 +166,8 @@ def test_every_problem_is_reported_once() -> None:
 )
 def test_the_exact_part_is_marked(text: str, marked: str) -> None:
     (problem,) = CHECKER.text(template(text))
-    start = problem.span.column - 1
-    assert text[start : start + problem.span.length] == marked
+    start = problem.primary.column - 1
+    assert text[start : start + problem.primary.length] == marked
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_values_and_formats(text: str, messages: list[str]) -> None:
 def test_the_whole_value_is_marked_if_the_file_does_not_contain_it_literally() -> None:
     span = Span(FILE, 4, 7, 40)
     (problem,) = CHECKER.expression(compile_expression("message.doubl"), span)
-    assert problem.span == span
+    assert problem.primary == span
 
 
 NO_BOOL = "a condition must be a bool, not"
