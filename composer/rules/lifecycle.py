@@ -6,9 +6,7 @@ from collections.abc import Iterator
 
 from composer.base.diagnostics import Diagnostic, Label, error, suggestion, warning
 from composer.base.source import Located, Span
-from composer.language.rules import CYCLE
 from composer.model import (
-    Dependency,
     Node,
     OnFailure,
     PortKind,
@@ -20,7 +18,7 @@ from composer.model import (
 )
 from composer.model.dependencies import dependency_cycles
 from composer.rules.analysis.context import Context, is_unresolved
-from composer.rules.analysis.formatting import number
+from composer.rules.analysis.formatting import cycle_of, number
 from composer.rules.analysis.rates import timed_publishers
 from composer.rules.analysis.subjects import PORT_SECTIONS, earlier_errors
 
@@ -32,31 +30,17 @@ FAILURE_SETTINGS = warning("RC406", "failure-settings")
 
 def check_dependency_cycle(context: Context) -> Iterator[Diagnostic]:
     """Report one cycle for every group of nodes that depend on each other."""
-    for cycle in dependency_cycles(context.system):
-        pairs = list(zip(cycle, (*cycle[1:], cycle[0]), strict=True))
-        steps = [(_dependency(context.system, *pair), *pair) for pair in pairs]
-        path = " -> ".join((*cycle, cycle[0]))
-        message = (
-            f"node '{cycle[0]}' depends on itself"
-            if len(cycle) == 1
-            else f"nodes depend on each other in a cycle: {path}"
-        )
-        yield Diagnostic(
-            CYCLE,
-            message,
-            steps[0][0].node.span,
-            tuple(
-                Label(dependency.node.span, f"'{name}' depends on '{other}'")
-                for dependency, name, other in steps[1:]
-            ),
-            "remove the dependency" if len(cycle) == 1 else "remove one of the dependencies",
-        )
+    hints = ("remove the dependency", "remove one of the dependencies")
+    for names in dependency_cycles(context.system):
+        pairs = zip(names, (*names[1:], names[0]), strict=True)
+        links = [(name, _dependency(context.system, name, other)) for name, other in pairs]
+        yield cycle_of("node", ("depends on", "depend on"), links, hints)
 
 
-def _dependency(system: System, name: str, other: str) -> Dependency:
+def _dependency(system: System, name: str, other: str) -> Located[str]:
     node = system.node(name)
     found = node.depends_on if node is not None else ()
-    return next(item for item in found if item.node.value == other)
+    return next(item.node for item in found if item.node.value == other)
 
 
 def check_dependency_not_reached(context: Context) -> Iterator[Diagnostic]:

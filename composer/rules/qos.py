@@ -9,11 +9,11 @@ from itertools import islice
 from composer.base.diagnostics import Diagnostic, Label, errors_subject, info, suggestion, warning
 from composer.base.graphs import cycles
 from composer.base.source import Located
-from composer.language.rules import CYCLE, UNUSED_DECLARATION
-from composer.model import ChannelKind, NamedQos, Port, PortKind, PortOfNode
+from composer.language.rules import UNUSED_DECLARATION
+from composer.model import ChannelKind, Port, PortKind, PortOfNode
 from composer.model.qos import PRESETS, Durability, History, Liveliness, QosProfile, Reliability
 from composer.rules.analysis.context import Context, is_unresolved, limited
-from composer.rules.analysis.formatting import number, port_name
+from composer.rules.analysis.formatting import cycle_of, number, port_name
 from composer.rules.analysis.rates import rates, timed_publishers
 from composer.rules.analysis.subjects import earlier_errors, unknown_subjects
 from composer.rules.references import UNDECLARED_NAME
@@ -112,25 +112,10 @@ def check_qos_profile_cycle(context: Context) -> Iterator[Diagnostic]:
     for name, profile in profiles.items():
         if profile.extends is not None and profile.extends.value in profiles:
             graph[name].append(profile.extends.value)
+    hints = ("extend a preset", "extend a preset in one of them")
     for names in cycles(graph):
-        yield _profile_cycle([profiles[name] for name in names])
-
-
-def _profile_cycle(cycle: list[NamedQos]) -> Diagnostic:
-    places = [profile.extends or profile.name for profile in cycle]
-    names = [profile.name.value for profile in cycle]
-    path = " -> ".join((*names, names[0]))
-    message = (
-        f"QoS profile '{names[0]}' extends itself"
-        if len(cycle) == 1
-        else f"QoS profiles extend each other in a cycle: {path}"
-    )
-    labels = (
-        Label(place.span, f"'{name}' extends '{place}'")
-        for place, name in zip(places[1:], names[1:], strict=True)
-    )
-    hint = "extend a preset" if len(cycle) == 1 else "extend a preset in one of them"
-    return Diagnostic(CYCLE, message, places[0].span, tuple(labels), hint)
+        links = [(name, profiles[name].extends or profiles[name].name) for name in names]
+        yield cycle_of("QoS profile", ("extends", "extend"), links, hints)
 
 
 @limited

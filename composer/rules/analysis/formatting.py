@@ -6,8 +6,10 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, shown
+from composer.base.diagnostics import MAXIMUM_VALUE_LENGTH, Diagnostic, Label, shown
 from composer.base.fast_dataclass import replace
+from composer.base.source import Located
+from composer.language.rules import CYCLE
 from composer.model import PortKind, PortOfNode
 
 _LONG_VALUE = re.compile(rf"'([^']{{{MAXIMUM_VALUE_LENGTH + 1},}})'")
@@ -88,3 +90,23 @@ def _is_safe(character: str) -> bool:
 def port_name(endpoint: PortOfNode) -> str:
     """Return the name of a port in connections: ``planner.sensor_data``."""
     return f"{endpoint.node.name}.{endpoint.port.name}"
+
+
+def cycle_of(
+    noun: str,
+    verbs: tuple[str, str],
+    links: Sequence[tuple[str, Located[str]]],
+    hints: Sequence[str],
+) -> Diagnostic:
+    """Report things that need each other: ``links`` are their names, each with what it needs.
+
+    ``verbs`` and ``hints`` are for one thing, and for several ones.
+    """
+    (name, needed), *others = links
+    if not others:
+        message = f"{noun} '{name}' {verbs[0]} itself"
+        return Diagnostic(CYCLE, message, needed.span, hint=hints[0])
+    path = " -> ".join((*(item for item, _ in links), name))
+    message = f"{noun}s {verbs[1]} each other in a cycle: {path}"
+    labels = (Label(other.span, f"'{item}' {verbs[0]} '{other}'") for item, other in others)
+    return Diagnostic(CYCLE, message, needed.span, tuple(labels), hints[1])
