@@ -46,9 +46,7 @@ PARAMETER_TYPES: Mapping[str, str] = {
 }
 #: The attributes of a behavior with ports, and the kinds of port in them.
 PORT_ATTRIBUTES: Mapping[str, PortKind] = {
-    "publishers": PortKind.PUBLISHER,
-    "clients": PortKind.CLIENT,
-    "action_clients": PortKind.ACTION_CLIENT,
+    kind.section: kind for kind in (PortKind.PUBLISHER, PortKind.CLIENT, PortKind.ACTION_CLIENT)
 }
 _DEFINITIONS = {"topic": Message, "service": Service, "action": Action}
 _HEAD = (
@@ -254,15 +252,11 @@ def _module(text: str) -> str:
 
 def _text(name: str, definition: Interface) -> str:
     """Return the stub of one interface."""
-    match definition:
-        case Service(request=request, response=response):
-            named = {"Request": request, "Response": response}
-            return "\n".join(_with_parts(name, named, "ServiceType"))
-        case Action(goal=goal, result=result, feedback=feedback):
-            named = {"Goal": goal, "Result": result, "Feedback": feedback}
-            return "\n".join(_with_parts(name, named, "ActionType"))
-        case _:
-            return "\n".join(_message(name, definition))
+    if isinstance(definition, Message):
+        return "\n".join(_message(name, definition))
+    named = {part.capitalize(): message for part, message in parts(definition).items()}
+    base = "ServiceType" if isinstance(definition, Service) else "ActionType"
+    return "\n".join(_with_parts(name, named, base))
 
 
 def _with_parts(name: str, parts: Mapping[str, Message], base: str) -> Iterator[str]:
