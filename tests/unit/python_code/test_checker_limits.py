@@ -125,4 +125,4 @@ def test_many_problems(begin: str, line: str, tmp_path: Path) -> None:
         is_limited = any("the rest is not shown" in item.message for item in found)
         assert is_limited == (count > check_module.MAX_FINDINGS)
 
-    assert_linear(check, 250, 1_500)
+    assert_linear(check, 100, 1_000)
