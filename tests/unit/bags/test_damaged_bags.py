@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import sqlite3
 import subprocess
 import sys
@@ -146,20 +147,13 @@ def test_nothing_is_overwritten_and_a_full_disk_is_named(tmp_path: Path) -> None
     write(tmp_path / "bag")
     with pytest.raises(BagError, match="exists already"):
         BagWriter(tmp_path / "bag")
-    limit = """
-import resource, sys
-from tests.unit.bags.test_form import write
-from pathlib import Path
-import signal
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-size = int(sys.argv[2])
-resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-write(Path(sys.argv[1]), 20_000, padding=bytes(range(256)) * 4)
-"""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
     for size in (10, 100_000):  # the disk is full from the beginning, or later
-        command = [sys.executable, "-c", limit, str(tmp_path / f"full{size}"), str(size)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert "BagError: cannot write" in done.stderr
-        assert "File too large" in done.stderr
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+        try:
+            with pytest.raises(BagError, match=r"cannot write .*File too large"):
+                write(tmp_path / f"full{size}", 20_000, padding=bytes(range(256)) * 4)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not (tmp_path / "full10").exists()
     assert len(read(open_bag(tmp_path / "full100000"))) > 1000

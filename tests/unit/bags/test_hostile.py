@@ -20,7 +20,7 @@ from composer.bags.recorder import Ring
 from tests.unit.bags.test_form import read
 
 #: Bytes of the message in a file of a few kilobytes, and what reading it may take.
-LARGE, MOST = 400_000_000, 200_000_000
+LARGE, MOST = 200_000_000, 100_000_000
 
 
 def write(path: Path, compression: CompressionType, size: int, count: int = 1) -> None:
