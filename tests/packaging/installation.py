@@ -19,6 +19,10 @@ BASH = ("bash", "--noprofile", "--norc", "-eo", "pipefail", "-c")
 # Set by the ros wheels of this Python, and valid for this Python only.
 WHEEL_VARIABLES = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
 ROS_VARIABLES = ("AMENT_PREFIX_PATH", "PYTHONPATH")
+#: The packages of this Python, as a value of PYTHONPATH.
+SITES = os.pathsep.join(
+    path for path in sys.path if path.endswith(("site-packages", "dist-packages"))
+)
 
 
 def without_ros() -> dict[str, str]:
@@ -33,8 +37,7 @@ def without_ros() -> dict[str, str]:
 
 def with_this_ros() -> dict[str, str]:
     """Return environment variables with which another Python uses the ROS of this one."""
-    sites = [path for path in sys.path if path.endswith(("site-packages", "dist-packages"))]
-    return dict(os.environ) | {"PYTHONPATH": os.pathsep.join(sites)}
+    return dict(os.environ) | {"PYTHONPATH": SITES}
 
 
 def run_step(name: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.packaging.installation import without_ros
+from tests.packaging.installation import SITES, without_ros
 
 ROOT = Path(__file__).parents[2]
 HAS_PRE_COMMIT = importlib.util.find_spec("pre_commit") is not None
@@ -38,12 +39,19 @@ def committed(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def user(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A repository that uses the hook of this working tree."""
+    """A repository that uses the hook of this working tree.
+
+    The hook is published without its dependencies, which test_installation installs, and uses the
+    packages of this Python.
+    """
     published = tmp_path_factory.mktemp("published")
     for name in git(ROOT, "ls-files", "--cached", "--others", "--exclude-standard").splitlines():
         if (ROOT / name).is_file() and not name.startswith(("tests/", "benchmarks/")):
             (published / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, published / name)
+    project = (published / "pyproject.toml").read_text(encoding="utf-8")
+    project = re.sub(r"(?ms)^dependencies = \[$.*?^\]$", "dependencies = []", project)
+    (published / "pyproject.toml").write_text(project, encoding="utf-8")
     revision = committed(published)
     folder = tmp_path_factory.mktemp("user")
     configuration = f"""\
@@ -61,21 +69,29 @@ repos:
     return folder
 
 
-def run_hook(folder: Path, home: Path) -> subprocess.CompletedProcess[str]:
+def pre_commit(
+    folder: Path, home: Path, *arguments: str, **variables: str
+) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "pre_commit", "run", "--all-files", "--color", "never"],
+        [sys.executable, "-m", "pre_commit", *arguments, "--color", "never"],
         cwd=folder,
-        env=without_ros() | {"PRE_COMMIT_HOME": str(home), "GITHUB_ACTIONS": "false"},
+        env=without_ros() | {"PRE_COMMIT_HOME": str(home), "GITHUB_ACTIONS": "false"} | variables,
         capture_output=True,
         text=True,
         check=False,
     )
 
 
+def run_hook(folder: Path, home: Path) -> subprocess.CompletedProcess[str]:
+    return pre_commit(folder, home, "run", "--all-files", PYTHONPATH=SITES)
+
+
 def test_the_hook_passes_valid_files_and_fails_on_errors(
     user: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     home = tmp_path_factory.mktemp("pre_commit")
+    done = pre_commit(user, home, "install-hooks")
+    assert done.returncode == 0, done.stdout
     done = run_hook(user, home)
     assert done.returncode == 0, done.stdout
     assert "compose validate" in done.stdout
