@@ -89,11 +89,7 @@ def test_the_words_of_a_value_are_offered(server: LanguageServer) -> None:
         (f"{CONNECTIONS}- t|", f"topic service action {ENDS}", ""),
         (f"{CONNECTIONS}- {{topic: a, from: n.a}}\n  - |", f"topic service action {ENDS}", ""),
         (f"{CONNECTIONS}- from: n.a\n    |", "topic to", "from"),
-        (
-            f"{CONNECTIONS}- topic: a\n    |",
-            "from to qos",
-            "topic service action server clients",
-        ),
+        (f"{CONNECTIONS}- topic: a\n    |", "from to qos", "topic service action server clients"),
         (f"{CONNECTIONS}- service: a\n    |", "server clients qos", "topic service action from to"),
         (f"{CONNECTIONS}- action: a\n    |", "server clients qos", "topic service action from to"),
     ],

@@ -20,10 +20,7 @@ def log_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("before", "limit_s"),
-    [
-        ("", 0.01),
-        ("os.write(int(os.environ['COMPOSE_READY_FD']), b'3 of')", 1.0),
-    ],
+    [("", 0.01), ("os.write(int(os.environ['COMPOSE_READY_FD']), b'3 of')", 1.0)],
     ids=["no report", "half a report"],
 )
 def test_a_process_that_does_not_report_is_killed(

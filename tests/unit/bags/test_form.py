@@ -87,11 +87,7 @@ def read(bag: Bag) -> list[BagMessage]:
 
 @pytest.mark.parametrize(
     ("limits", "files"),
-    [
-        (SplitLimits(), 1),
-        (SplitLimits(duration_s=0.05), 4),
-        (SplitLimits(size_bytes=1), 20),
-    ],
+    [(SplitLimits(), 1), (SplitLimits(duration_s=0.05), 4), (SplitLimits(size_bytes=1), 20)],
 )
 def test_others_read_what_we_write(tmp_path: Path, limits: SplitLimits, files: int) -> None:
     folder = tmp_path / "bag"

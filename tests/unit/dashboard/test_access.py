@@ -8,13 +8,7 @@ from typing import Any
 
 import pytest
 
-from composer.dashboard.access import (
-    Access,
-    InvalidTokenFileError,
-    Request,
-    new_token,
-    read_token,
-)
+from composer.dashboard.access import Access, InvalidTokenFileError, Request, new_token, read_token
 
 TOKEN = "correct-horse-battery-staple"
 OWN = "127.0.0.1:8800"

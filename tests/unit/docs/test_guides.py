@@ -78,8 +78,7 @@ def test_make_run_builds_the_interfaces_of_the_examples() -> None:
 
 
 @pytest.mark.parametrize(
-    "path",
-    ["docs/guides/projects.md", "composer/bridges/templates/project/README.md.in"],
+    "path", ["docs/guides/projects.md", "composer/bridges/templates/project/README.md.in"]
 )
 def test_pytest_is_installed_before_it_runs(path: str) -> None:
     text = text_of(path)

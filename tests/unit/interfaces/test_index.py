@@ -119,9 +119,7 @@ def test_only_requested_packages_are_read(tmp_path: Path) -> None:
     assert interfaces.problem("demo_msgs/msg/B") is not None
 
 
-def test_prefixes_are_of_the_environment_then_of_python(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_prefixes_are_of_the_environment_then_of_python(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/opt/overlay::/opt/ros/jazzy")
     roots = [prefix.root for prefix in installed_prefixes()]
     assert roots == [Path("/opt/overlay"), Path("/opt/ros/jazzy"), Path(sys.prefix)]

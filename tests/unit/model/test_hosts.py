@@ -197,9 +197,7 @@ def test_nodes_have_processes_by_name_pattern_and_key(system: System) -> None:
     assert system.hosts[0].setup == ("env.sh",)
 
 
-def test_a_process_takes_failed_nodes_down_and_knows_how_far_nodes_start(
-    system: System,
-) -> None:
+def test_a_process_takes_failed_nodes_down_and_knows_how_far_nodes_start(system: System) -> None:
     member = member_system(system, "vision", {"camera_front": PrimaryState.INACTIVE})
     assert member.name.value == "robot/vision"
     assert [node.full_name for node in member.nodes] == ["/lab/camera_front", "/lab/camera_rear"]

@@ -132,9 +132,7 @@ def test_imports_that_fail(
     assert (item.rule.name, item.primary.text, item.hint) == (rule, text, hint), code
 
 
-def test_imports_that_succeed_or_need_not(
-    reported: Mapping[tuple[str, int], Diagnostic],
-) -> None:
+def test_imports_that_succeed_or_need_not(reported: Mapping[tuple[str, int], Diagnostic]) -> None:
     for place, text in ((("searching", 3), "meter"), (("loading", 3), "motoor")):
         found = reported[place]
         assert (found.rule.name, found.primary.text) == ("not-installed", text)

@@ -28,10 +28,7 @@ def tree_of(text: str, name: str = "f") -> Mapping:
 
 
 def resolve_text(
-    text: str,
-    folder: Path = NOWHERE,
-    settings: Iterable[str] = (),
-    namespace: str | None = None,
+    text: str, folder: Path = NOWHERE, settings: Iterable[str] = (), namespace: str | None = None
 ) -> tuple[System, list[Diagnostic]]:
     """Resolve a text; node types are looked for in ``folder``."""
     tree = tree_of(text, "robot.yaml")
@@ -50,10 +47,7 @@ def resolve_text(
 
 
 def system_of(
-    text: str,
-    folder: Path = NOWHERE,
-    settings: Iterable[str] = (),
-    namespace: str | None = None,
+    text: str, folder: Path = NOWHERE, settings: Iterable[str] = (), namespace: str | None = None
 ) -> System:
     """Resolve a text that has nothing wrong in it."""
     system, diagnostics = resolve_text(text, folder, settings, namespace)

@@ -8,11 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from composer.bridges.scaffolding import (
-    InvalidPackage,
-    bundled_package,
-    read_package,
-)
+from composer.bridges.scaffolding import InvalidPackage, bundled_package, read_package
 from tests.unit.support.checking import write_files
 
 VERSIONS = {"builtin_interfaces": "2.0.3", "geometry_msgs": "5.3.6"}

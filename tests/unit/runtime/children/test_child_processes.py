@@ -17,12 +17,7 @@ from pathlib import Path
 import pytest
 
 from composer.runtime.children import launcher
-from composer.runtime.children.child_processes import (
-    Child,
-    ChildProcesses,
-    Command,
-    StartFailed,
-)
+from composer.runtime.children.child_processes import Child, ChildProcesses, Command, StartFailed
 from composer.runtime.executors.tracebacks import format_stack, stacks_of
 from tests.unit.support.waiting import PATIENCE_S, is_alive, status_of, wait_until
 
@@ -130,11 +125,7 @@ def test_a_program_that_cannot_start(
     ],
 )
 def test_ends_in_order(
-    children: ChildProcesses,
-    traps: str,
-    status: int,
-    limits_s: tuple[float, float],
-    least_s: float,
+    children: ChildProcesses, traps: str, status: int, limits_s: tuple[float, float], least_s: float
 ) -> None:
     lines: list[tuple[str, bool]] = []
     child = start(children, f"{traps}; echo ready; while true; do sleep 0.01; done", lines)

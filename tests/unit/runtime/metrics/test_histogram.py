@@ -18,11 +18,7 @@ from composer.cli.support.callback_tables import (
 )
 from composer.client.systems.local_queries import with_processes
 from composer.runtime.metrics.figures import CallbackMeter, CallbackRates, figures
-from composer.runtime.metrics.statistics import (
-    CallbackStatistics,
-    Histogram,
-    Statistics,
-)
+from composer.runtime.metrics.statistics import CallbackStatistics, Histogram, Statistics
 from composer.runtime.protocol.reports import (
     CallbackFigures,
     ChainFigures,

@@ -149,9 +149,7 @@ def test_a_command_uses_udp_only(discovery_range: str, tmp_path: Path) -> None:
     assert environment == before | {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
 
 
-def test_on_localhost_the_profile_replaces_the_discovery_range(
-    environment: dict[str, str],
-) -> None:
+def test_on_localhost_the_profile_replaces_the_discovery_range(environment: dict[str, str]) -> None:
     on_localhost = environment | LOCALHOST
     use_command_profile(environment)
     use_command_profile(on_localhost)

@@ -13,11 +13,7 @@ import pytest
 
 from composer.runtime.clock import COMPUTER
 from composer.runtime.process import StartRefused, instance_lock
-from composer.runtime.process.instance_lock import (
-    hold_instance_lock,
-    is_held,
-    local_systems,
-)
+from composer.runtime.process.instance_lock import hold_instance_lock, is_held, local_systems
 
 OTHER_USER = 65534
 NAME = "/robot"

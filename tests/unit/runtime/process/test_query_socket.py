@@ -143,9 +143,7 @@ def test_an_answer_of_another_version_is_not_used(
         assert read_graph("/robot", LIMIT_S) is None
 
 
-def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
-    serve: Serve,
-) -> None:
+def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(serve: Serve) -> None:
     released = threading.Event()
     serve(lambda: VIEW if released.wait(LIMIT_S) else None)
     began_s = time.monotonic()
@@ -154,9 +152,7 @@ def test_a_system_that_does_not_respond_costs_no_more_than_the_limit(
     released.set()
 
 
-def test_a_query_whose_command_has_given_up_is_skipped(
-    serve: Serve,
-) -> None:
+def test_a_query_whose_command_has_given_up_is_skipped(serve: Serve) -> None:
     released, answered = threading.Event(), threading.Semaphore(0)
 
     def view() -> GraphView:
@@ -202,9 +198,7 @@ def test_a_query_that_arrives_after_closing_ends() -> None:
         assert connection.recv(1) == b""
 
 
-def test_a_command_that_sends_slowly_is_left_in_the_end(
-    serve: Serve,
-) -> None:
+def test_a_command_that_sends_slowly_is_left_in_the_end(serve: Serve) -> None:
     serve(lambda: VIEW)
     with connected() as connection:
         began_s = time.monotonic()

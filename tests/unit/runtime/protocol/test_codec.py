@@ -16,12 +16,7 @@ from hypothesis import strategies as st
 
 from composer.runtime.members.kept_goals import SystemGoals
 from composer.runtime.protocol import codec, reports, requests
-from composer.runtime.protocol.codec import (
-    OtherVersionError,
-    ProtocolError,
-    decode,
-    encode,
-)
+from composer.runtime.protocol.codec import OtherVersionError, ProtocolError, decode, encode
 from composer.runtime.protocol.reports import (
     NodeReport,
     SystemReport,

@@ -9,12 +9,7 @@ import pytest
 
 from composer.plan import Step
 from composer.runtime.executors.futures import Future
-from composer.runtime.supervision.phases import (
-    ExecutionOptions,
-    Phase,
-    RunningStep,
-    wait_for_step,
-)
+from composer.runtime.supervision.phases import ExecutionOptions, Phase, RunningStep, wait_for_step
 
 
 def steps(*after: tuple[int, ...]) -> deque[Step]:
