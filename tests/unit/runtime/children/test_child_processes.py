@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -159,13 +159,16 @@ def test_nothing_is_left_after_close(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_no_orphan_whatever_ends_the_composer(number: signal.Signals) -> None:
-    mark = f"{os.getpid()}-{number.name}-{time.monotonic_ns()}"
-    with composer(mark) as process:
-        wait_until(lambda: len(marked(mark)) >= 4, "all of them")
-        process.send_signal(number)
-        process.wait(PATIENCE_S)
+def test_no_orphan_whatever_ends_the_composer() -> None:
+    numbers = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+    mark = f"{os.getpid()}-{time.monotonic_ns()}"
+    with ExitStack() as stack:
+        processes = [stack.enter_context(composer(mark)) for _ in numbers]
+        wait_until(lambda: len(marked(mark)) >= 4 * len(numbers), "all of them")
+        for process, number in zip(processes, numbers, strict=True):
+            process.send_signal(number)
+        for process in processes:
+            process.wait(PATIENCE_S)
         wait_until(lambda: not marked(mark), "the end of all children")
 
 
