@@ -8,6 +8,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -63,14 +64,20 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     shutil.rmtree(path)
 
 
-def compose_as_other(*words: str) -> Done:
-    """Run a command as a user who owns nothing here, and could not import its modules."""
+@cache
+def import_modules_of(*words: str) -> None:
+    """Run a command in another project."""
     folder = Path.cwd()
     other = make_project()
     os.chdir(other)
     compose(*words)
     os.chdir(folder)
     shutil.rmtree(other)
+
+
+def compose_as_other(*words: str) -> Done:
+    """Run a command as a user who owns nothing here, and could not import its modules."""
+    import_modules_of(*words)
     os.seteuid(OTHER_USER)
     try:
         return compose(*words)
