@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from composer.loading import load_models
 from composer.rules.analysis.context import Context
 from composer.rules.analysis.rates import rates
-from tests.unit.support.checking import load_project
+from tests.unit.support.checking import write_files
 
 HEAD = "system: demo\nnodes:\n"
 TALKER = """\
@@ -34,7 +35,8 @@ HANDLERS = {"on_fast": "pass", "on_slow": "pass", "on_reset": "return response",
 
 
 def topic_hz(name: str, text: str, folder: Path, python: str = "") -> float | None:
-    loading = load_project(folder, {"system.yaml": HEAD + text, "robot.py": python})
+    write_files(folder, {"system.yaml": HEAD + text, "robot.py": python})
+    [loading] = load_models([folder / "system.yaml"])
     context = Context(loading.system, loading.interfaces, loading.node_types)
     return rates(context).topic_hz(name)
 
