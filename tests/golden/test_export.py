@@ -15,7 +15,7 @@ from composer.bridges.export.kubernetes import manifests
 from composer.bridges.export.sros2 import policy
 from composer.bridges.export.systemd import Installation, units
 from composer.client.hosts.remote_command import python_words
-from composer.loading import load
+from composer.loading import load_models
 from composer.model import Host
 from tests.programs import require, require_module
 
@@ -31,7 +31,7 @@ LACKS = {"unknown_interfaces": ("acme_msgs", "lab_msgs")}
 def exported(name: str) -> dict[str, str]:
     """Return the files of a system by their names."""
     path = EXPECTED / name / "system.yaml"
-    system = load(path).system
+    system = load_models([path])[0].system
     assert system is not None
     needs = NEEDS if name == "robot" else LACKS if name == "outside" else {}
     contents = Contents("my_robot", PurePosixPath("systems/my robot.yaml"), **needs)  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ After an intended change, run ``pytest tests/golden --update-golden`` and review
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -13,11 +14,14 @@ import pytest
 
 from composer.base.diagnostics import Rule
 from composer.base.folders import systems_folder
-from composer.loading import load, load_files
+from composer.loading import load, load_files, load_models
+from composer.loading.reported import LoadResult
 from composer.plan import bring_up, tear_down
 from composer.python_code.problems import Family
+from composer.report.machine import render_sarif
 from composer.report.text import render
 from composer.rules import all_checks
+from tests.unit.support.reporting import check_sarif
 
 ROOT = Path(__file__).parents[2]
 ERRORS = Path("tests/golden/err")
@@ -28,31 +32,35 @@ CODE = re.compile(r"^\w+\[(RC\d+) ", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
-def reports() -> dict[str, str]:
-    """The reports of all files. All at once: the type checker starts once."""
+def results() -> dict[str, LoadResult]:
+    """What is found in all files. All at once: the type checker starts once."""
     with pytest.MonkeyPatch.context() as current:
         current.chdir(ROOT)
-        results = load_files(ERRORS / name for name in CASES)
-        return {
-            name: render(result.diagnostics) for name, result in zip(CASES, results, strict=True)
-        }
+        return dict(zip(CASES, load_files(ERRORS / name for name in CASES), strict=True))
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_report_matches_the_golden_file(
     name: str,
-    reports: dict[str, str],
+    results: dict[str, LoadResult],
     request: pytest.FixtureRequest,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(ROOT)
-    report = reports[name]
+    report = render(results[name].diagnostics)
     expected = ERRORS / f"{Path(name).stem}.txt"
     if request.config.getoption("--update-golden"):
         expected.write_text(report, encoding="utf-8")
     assert report == expected.read_text(encoding="utf-8")
     assert CODE.search(report), "every file in err/ has a mistake"
     assert str(ROOT) not in report, "reports contain no absolute paths"
+
+
+def test_every_report_matches_the_schema_of_sarif(results: dict[str, LoadResult]) -> None:
+    for name, result in results.items():
+        log = json.loads(render_sarif(result.diagnostics))
+        assert log["runs"][0]["results"], name
+        check_sarif(log)
 
 
 def test_every_report_has_its_file() -> None:
@@ -81,7 +89,7 @@ def test_ten_mistakes_give_ten_diagnostics(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("path", SYSTEMS, ids=[path.stem for path in SYSTEMS])
 def test_plan(path: Path) -> None:
-    system = load(path).system
+    system = load_models([path])[0].system
     assert system is not None
     printed = f"# up\n{bring_up(system)}\n# down\n{tear_down(system)}\n"
     assert printed == (PLANS / f"{path.stem}.txt").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ import pytest
 
 import composer
 from composer import behavior
-from composer.loading import load, load_files
+from composer.loading import load_files, load_models
 from composer.model.interface_packages import NOT_IN_WHEELS, used_packages
 from composer.model.resolve.parameter_files import ParameterFiles, read_parameter_file
 from tests.unit.support.checking import write_files
@@ -69,10 +69,9 @@ def test_make_run_builds_the_interfaces_of_the_examples() -> None:
     built = re.search(r"^UNPUBLISHED := (.+)$", text_of("Makefile"), re.MULTILINE)
     assert built is not None
     needed: set[str] = set()
-    for path in (ROOT / "systems").glob("*.yaml"):
-        system = load(path).system
-        assert system is not None, path
-        needed |= used_packages(system).keys() & NOT_IN_WHEELS
+    for loading in load_models((ROOT / "systems").glob("*.yaml")):
+        assert loading.system is not None, loading.source.path
+        needed |= used_packages(loading.system).keys() & NOT_IN_WHEELS
     assert "tf2_msgs" in needed
     assert needed <= {"composer_interfaces", *built[1].split()}
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
 from composer.base.diagnostics import Diagnostic, Label, Rule, Severity
 from composer.base.source import SourceFile, Span
+from tests.programs import require_module
 
 
 def rule(severity: Severity = Severity.ERROR, code: str = "RC202", name: str = "made-up") -> Rule:
@@ -28,3 +32,14 @@ def diagnostic(
 ) -> Diagnostic:
     source = SourceFile(path, text)
     return Diagnostic(made_by or rule(), message, span_of(source, marked, line), related, hint)
+
+
+def check_sarif(log: Any) -> None:
+    """Raise ValueError if the log does not match the OASIS schema of SARIF.
+
+    The package pydantic-sarif is generated from ``sarif-schema-2.1.0.json``. It checks required,
+    unknown properties, types, enumerations and minimum values, and no URIs and indexes.
+    """
+    # Not above: importing it takes longer than collecting a hundred files of tests.
+    model = require_module("pydantic_sarif.model")
+    model.StaticAnalysisResultsFormatSarifVersion210JsonSchema.model_validate_json(json.dumps(log))

@@ -11,7 +11,7 @@ import pytest
 from composer.bridges.export.deployment import Service
 from composer.bridges.export.systemd import Installation, units
 from composer.client.hosts.remote_command import python_words
-from composer.loading import load
+from composer.loading import load_models
 from composer.model import Host, System
 from tests.cli.compose import compose
 
@@ -28,7 +28,7 @@ hosts: {jetson: {}}
 def system_of(folder: Path, text: str = "") -> tuple[System, Path]:
     path = folder / "my robot.yaml"
     path.write_text(f"system: robot\ndescription: 100 % \\\n{NODES}{text}")
-    found = load(path).system
+    found = load_models([path])[0].system
     assert found is not None
     return found, path
 
