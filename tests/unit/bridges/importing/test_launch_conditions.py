@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from composer.bridges.importing.conditions import condition
 from composer.language.tree import plain
-from composer.loading import load
+from composer.loading import load_models
 from composer.model.resolve import OverrideOptions
 from tests.examples import examples
 from tests.unit.bridges.importing.test_launch_arguments import (
@@ -130,7 +130,7 @@ def test_a_system_starts_what_the_launch_file_starts(
         values = dict(zip(VALUES, chosen, strict=True))
         expected = {item["name"]: (item["arguments"], item["parameters"]) for item in nodes(values)}
         words = tuple(f"{k}={v}" for k, v in values.items() if k in system.get("arguments", {}))
-        result = load(path, overrides=OverrideOptions(arguments=words))
+        [result] = load_models([path], OverrideOptions(arguments=words))
         tree = plain(result.tree) if result.tree is not None else {}
         assert isinstance(tree, dict)
         found = {
