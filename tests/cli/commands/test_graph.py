@@ -13,11 +13,19 @@ PIPELINE = "systems/pipeline.yaml"
 PIPELINE_FILE = str(Path(PIPELINE).resolve())
 
 
-def test_the_default_is_a_mermaid_diagram_on_stdout() -> None:
+def test_the_output_is_mermaid_or_a_view_of_one_or_several_systems() -> None:
     done = compose("graph", PIPELINE)
     assert (done.code, done.err) == (0, "")
     assert "flowchart LR" in done.out
     assert "/sensor_data" in done.out
+    done = compose("graph", PIPELINE, "--view", "lifecycle", "-f", "json")
+    (edge,) = json.loads(done.out)["edges"]
+    ends = ("node:/planning/planner", "node:/control/motor_controller")
+    assert (edge["source"], edge["target"]) == ends
+    done = compose("graph", "systems/minimal.yaml", "talker_listener", "-f", "json")
+    data = json.loads(done.out)
+    assert data["title"] == "minimal + talker_listener"
+    assert {"node:/talker", "node:/listener"} <= {vertex["key"] for vertex in data["vertices"]}
 
 
 @pytest.mark.parametrize(
@@ -68,14 +76,6 @@ def test_a_failed_write_leaves_the_file_as_it_was(
     assert target.read_text(encoding="utf-8") == "before"
 
 
-def test_views() -> None:
-    done = compose("graph", PIPELINE, "--view", "lifecycle", "-f", "json")
-    edges = json.loads(done.out)["edges"]
-    assert [(edge["source"], edge["target"]) for edge in edges] == [
-        ("node:/planning/planner", "node:/control/motor_controller")
-    ]
-
-
 def test_a_system_with_errors_is_drawn_if_there_is_one(folder: Path) -> None:
     write_files(
         {"a.yaml": "system: a\nnodes:\n  one: {lifecycle: {depends_on: [two]}}\n", "b.yaml": "["}
@@ -85,13 +85,6 @@ def test_a_system_with_errors_is_drawn_if_there_is_one(folder: Path) -> None:
     assert "class v1 wrong" in done.out
     assert "error[" in done.err
     assert refused(1, "graph", "b.yaml")
-
-
-def test_several_systems_are_drawn_in_one_diagram() -> None:
-    done = compose("graph", "systems/minimal.yaml", "talker_listener", "-f", "json")
-    data = json.loads(done.out)
-    assert data["title"] == "minimal + talker_listener"
-    assert {"node:/talker", "node:/listener"} <= {vertex["key"] for vertex in data["vertices"]}
 
 
 def test_a_diagram_too_large_for_mermaid_prints_a_warning(folder: Path) -> None:

@@ -12,15 +12,6 @@ from tests.cli.compose import compose, refused, write_files
 _SUFFIXES = (".yaml", ".py", ".xml", ".md", ".msg")
 
 
-@pytest.fixture
-def project(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    done = compose("new", "project", "my_robot")
-    assert done.code == 0, done.err
-    assert "my_robot/systems/my_robot.yaml" in done.out.splitlines()
-    monkeypatch.chdir(folder / "my_robot")
-    return folder / "my_robot"
-
-
 def test_a_project_and_what_is_added_to_it_are_valid(project: Path) -> None:
     assert compose("validate", "--strict", ".").code == 0
     for kind, name in (("system", "arm"), ("node", "gripper"), ("interfaces", "my_msgs")):

@@ -24,13 +24,6 @@ nodes:
 """
 
 
-@pytest.fixture
-def project(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    assert compose("new", "project", "my_robot").code == 0
-    monkeypatch.chdir(folder / "my_robot")
-    return folder / "my_robot"
-
-
 def contents(folder: Path) -> dict[str, bytes]:
     """Return the files below a folder, with their contents."""
     files = (path for path in folder.rglob("*") if path.is_file())
