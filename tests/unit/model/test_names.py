@@ -7,7 +7,6 @@ from collections.abc import Callable
 import pytest
 
 from composer.model.names import (
-    expand_name,
     is_hidden,
     is_selected,
     join,
@@ -69,20 +68,6 @@ PROBLEMS: dict[Callable[[str], str | None], dict[str, str | None]] = {
 )
 def test_problems(check: Callable[[str], str | None], name: str, problem: str | None) -> None:
     assert check(name) == problem
-
-
-@pytest.mark.parametrize(
-    ("name", "expanded"),
-    [
-        ("/scan", "/scan"),
-        ("scan", "/perception/scan"),
-        ("front/scan", "/perception/front/scan"),
-        ("~/scan", "/perception/camera/scan"),
-        ("~", "/perception/camera"),
-    ],
-)
-def test_expanding(name: str, expanded: str) -> None:
-    assert expand_name(name, "camera", "/perception") == expanded
 
 
 @pytest.mark.parametrize(

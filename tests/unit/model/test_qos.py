@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-
-import pytest
+from dataclasses import fields
 
 from composer.model.qos import (
     PRESETS,
     Durability,
-    History,
     Incompatibility,
     Liveliness,
     QosProfile,
@@ -29,16 +26,6 @@ STRONG = QosProfile(
     liveliness=Liveliness.MANUAL_BY_TOPIC,
     liveliness_lease_duration_ms=100.0,
 )
-
-
-def test_a_strong_offer_meets_every_request() -> None:
-    assert incompatibilities(STRONG, WEAK) == ()
-    assert incompatibilities(STRONG, STRONG) == ()
-    for profile in PRESETS.values():
-        assert incompatibilities(profile, profile) == ()
-    # History, depth and lifespan never matter.
-    odd = replace(WEAK, history=History.KEEP_ALL, depth=1, lifespan_ms=1.0)
-    assert incompatibilities(odd, WEAK) == incompatibilities(WEAK, odd) == ()
 
 
 #: Policies as they are named in YAML; what is offered and requested; the consequence.
@@ -65,15 +52,3 @@ def test_the_three_patterns() -> None:
     assert (sensor_data.reliability, sensor_data.depth) == (Reliability.BEST_EFFORT, 5)
     assert (command.reliability, command.depth) == (Reliability.RELIABLE, 10)
     assert (state.durability, state.depth) == (Durability.TRANSIENT_LOCAL, 1)
-
-
-@pytest.mark.parametrize("policy", ["deadline_ms", "liveliness_lease_duration_ms"])
-@pytest.mark.parametrize(
-    ("offered", "requested", "fits"),
-    [(10.0, 10.0, True), (10.0, 20.0, True), (20.0, 10.0, False), (5.0, None, True)],
-)
-def test_periods(policy: str, offered: float | None, requested: float | None, fits: bool) -> None:
-    found = incompatibilities(
-        replace(WEAK, **{policy: offered}), replace(WEAK, **{policy: requested})
-    )
-    assert [item.policy for item in found] == ([] if fits else [policy])

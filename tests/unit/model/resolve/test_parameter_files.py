@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -67,33 +66,6 @@ def test_the_later_value_counts_and_the_command_line_last(tmp_path: Path) -> Non
     second = section("/planning/*", 4.0)
     assert value("speed", tmp_path, first, second) == pytest.approx(4.0)
     assert value("speed", tmp_path, first, second, "planner.speed=5.0") == pytest.approx(5.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "meant"),
-    [
-        ("off", False),
-        ("Yes", True),
-        ("010", 8),
-        ("08", 8.0),
-        ("0x1F", 31),
-        ("+.inf", math.inf),
-        ("infinity", math.inf),
-        ("1e-400", "1e-400"),
-        ("9223372036854775808", 2.0**63),
-        ("0o17", "0o17"),
-        ("null", "null"),
-        ("'5'", "5"),
-        ("!!str 5", "5"),
-        ("!!int '5'", "5"),
-        ("[yes, N]", [True, False]),
-    ],
-)
-def test_values_are_those_of_rcl(text: str, meant: Plain, tmp_path: Path) -> None:
-    files, messages = read(f"n: {{ros__parameters: {{p: {text}}}}}", tmp_path)
-    assert messages == []
-    (found,) = (plain(entry.value) for entry in files.sections[0].values.values())
-    assert (found, type(found)) == (meant, type(meant))
 
 
 def test_a_misspelled_ros__parameters_is_reported_once(tmp_path: Path) -> None:
