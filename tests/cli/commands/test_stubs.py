@@ -43,6 +43,8 @@ def classes(project: Path) -> list[str]:
 
 def test_stubs_of_the_project_are_written_and_are_up_to_date(project: Path) -> None:
     (project / "systems/extra.yaml").write_text(SYSTEM)
+    code = (project / "nodes/counter.py").read_text()
+    assert "from composer.typed import CounterBehavior" in code
     done = compose("stubs")
     assert (done.code, done.out) == (0, "")
     assert "'typings': " in done.err
@@ -55,14 +57,6 @@ def test_stubs_of_the_project_are_written_and_are_up_to_date(project: Path) -> N
         ast.parse(text)
     assert compose("stubs", "--check").code == 0
     assert compose("stubs").err == "'typings' is up to date\n"
-
-
-def test_a_behavior_runs_and_is_tested_without_the_stubs(project: Path) -> None:
-    done = run_python("-m", "pytest", "-q", "tests/test_counter_node.py")
-    assert done.returncode == 0, done.stdout
-    code = (project / "nodes/counter.py").read_text()
-    assert "from composer.typed import CounterBehavior" in code
-    assert compose("validate", "--strict", ".").code == 0
 
 
 def test_the_output_depends_on_the_given_files_only(project: Path) -> None:
