@@ -290,7 +290,7 @@ class Host:
         monitor.start()
         try:
             if self._bring_up():
-                monitor.system_is_up()
+                self._node_set.run_state.is_up = True
                 self._supervise()
         finally:
             self._limits.limit_end()
@@ -343,7 +343,7 @@ class Host:
 
     def on_older_instance(self, namespace: str, instance: Instance) -> None:
         """End the run, because the system already runs elsewhere; its nodes stay as they are."""
-        self._node_set.leave_others()
+        self._node_set.run_state.leaves_others = True
         if not self._main_queue.stopping:
             self._fail(str(already_running(namespace, instance.host, instance.pid)))
 

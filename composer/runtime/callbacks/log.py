@@ -138,10 +138,18 @@ class ErrorLimit:
     It counts only while it is not ``paused``, as it is until :meth:`start`.
     """
 
-    def __init__(self, max_errors: int, window_s: float, report: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        max_errors: int,
+        window_s: float,
+        report: Callable[[str], None],
+        counts: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """Count errors only while ``counts()``."""
         self._max_errors = max_errors
         self._window_s = window_s
         self._report = report
+        self._counts = counts
         self._lock = threading.Lock()
         self._times_s: deque[float] = deque(maxlen=max_errors + 1)
         self._has_reported = False
@@ -157,7 +165,7 @@ class ErrorLimit:
     def count(self, now_s: float) -> None:
         """Count an error; report it if it is one too many."""
         with self._lock:
-            if self.paused or self._has_reported:
+            if self.paused or self._has_reported or not self._counts():
                 return
             self._times_s.append(now_s)
             is_full = len(self._times_s) > self._max_errors

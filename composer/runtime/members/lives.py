@@ -25,6 +25,7 @@ from composer.model.names import PROGRAM_LOGGER
 from composer.runtime.children.child_processes import Child, ChildProcesses, Command
 from composer.runtime.executors.loop import Loop
 from composer.runtime.middleware.environment import CONSOLE_FORMAT
+from composer.runtime.node.managed_node import RunState
 from composer.runtime.process.instance_lock import (
     ALREADY_RUNS,
     REPORT_KEY_VARIABLE,
@@ -63,6 +64,7 @@ class MemberContext:
     namespace: str
     command: Sequence[str]
     write_log: Callable[[LogLevel, str, str], None]
+    run_state: RunState
     together: Callable[[], AbstractContextManager[None]] = nullcontext
 
     def full_name(self, process: Process) -> str:

@@ -87,10 +87,6 @@ class MemberNode(OutsideNode):
         """Whether its process reports that its program has ended itself, with exit status 0."""
         return self._has_finished
 
-    def leave(self) -> None:
-        """Leave the nodes of its process as they are, unless the process was started here."""
-        self._process.leave()
-
     def destroy(self) -> None:
         """Do nothing: the node belongs to its process."""
 
@@ -175,11 +171,12 @@ class MemberNode(OutsideNode):
         return not self._is_moving and self._reported not in (INACTIVE, ACTIVE)
 
     async def _request(self, transition: str) -> None:
-        if self._process.is_left:
-            return
-        if transition == "shutdown" and self._process.pid is None:
-            await self._follow_end()
-            return  # a process that was not started here may be used again
+        if self._process.pid is None:
+            if self._run_state.leaves_others:
+                return
+            if transition == "shutdown":
+                await self._follow_end()
+                return  # a process that was not started here may be used again
         if self._reported in DONE_IN[transition]:
             return
         goal, reported = TRANSITIONS[transition].goal, Future[None]()
@@ -226,7 +223,8 @@ class MemberNode(OutsideNode):
 
     async def _wait_for_counters(self, reported: Future[None]) -> None:
         """Wait for the last report, with the final counters; the node is down without it, too."""
-        left_s = math.inf if self._end_s is None else self._end_s - self.loop.clock.monotonic()
+        end_s = self._run_state.end_s
+        left_s = math.inf if end_s is None else end_s - self.loop.clock.monotonic()
         wait_s = min(REPORTED_WITHIN_S, left_s / 2.0)
         await wait_for(self.loop, reported, max(0.0, wait_s))
 
@@ -240,8 +238,8 @@ class MemberNode(OutsideNode):
             start_s = max(start_s, self._process.moved_s)
             self.transition_started_s = start_s
             end_s = start_s + self._timeout_s
-            if self._end_s is not None:
-                end_s = min(end_s, self._end_s)
+            if self._run_state.end_s is not None:
+                end_s = min(end_s, self._run_state.end_s)
             if self.loop.clock.monotonic() >= end_s:
                 raise ProcessUnavailable(f"{self._process} does not respond")
             await wait_for(self.loop, future, end_s - self.loop.clock.monotonic())

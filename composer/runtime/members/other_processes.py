@@ -7,12 +7,10 @@ from contextlib import AbstractContextManager, contextmanager
 
 from composer.model import PrimaryState, System
 from composer.runtime.callbacks.log import Write
-from composer.runtime.children.child_processes import ChildProcesses
-from composer.runtime.executors.loop import Loop
 from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.members.lives import MemberContext
 from composer.runtime.members.process import MemberProcess
-from composer.runtime.node.options import ProcessContext
+from composer.runtime.outside_nodes.outside_node import OutsideContext
 from composer.runtime.process.computer import is_this_computer
 from composer.runtime.process.instance_lock import goals_path
 from composer.runtime.protocol.reports import SystemReport
@@ -41,9 +39,7 @@ class OtherProcesses:
         self._goals = KeptGoals(system, goals_path(namespace) if self._models else None)
         self._processes: dict[str, MemberProcess] = {}
 
-    def process(
-        self, name: str, loop: Loop, context: ProcessContext, children: ChildProcesses
-    ) -> MemberProcess:
+    def process(self, name: str, context: OutsideContext) -> MemberProcess:
         """Return a process, for the first of its nodes a new one. All have the same loop."""
         if name not in self._processes:
             model = self._models[name]
@@ -52,13 +48,14 @@ class OtherProcesses:
             self._processes[name] = MemberProcess(
                 model,
                 MemberContext(
-                    loop=loop,
+                    loop=context.loop,
                     manager=context.manager,
-                    children=children,
+                    children=context.children,
                     namespace=self._namespace,
                     command=self._command if is_local else (),
                     write_log=self._write_log,
                     together=self._together,
+                    run_state=context.run_state,
                 ),
             )
         return self._processes[name]
@@ -79,11 +76,6 @@ class OtherProcesses:
         finally:
             for process in processes:
                 process.requests.release()
-
-    def limit_end(self) -> None:
-        """Let the next requests be the last ones of the processes that were started here."""
-        for process in self._all:
-            process.requests.are_last = process.pid is not None
 
     def close(self) -> None:
         """Stop to observe the processes. Their loop has stopped."""

@@ -62,7 +62,6 @@ class MemberProcess:
         self.moved_s = 0.0
         self._lives = MemberLives(self._name, str(self), context, self._fail)
         self._starting: Future[None] | None = None
-        self._belongs_to_another = False
         self.requests = MemberRequests(
             context.manager,
             context.loop,
@@ -84,11 +83,6 @@ class MemberProcess:
         """Its process id, if it was started here."""
         life = self._lives.current
         return None if life is None or life.child is None else life.child.pid
-
-    @property
-    def is_left(self) -> bool:
-        """Whether it was not started here, and its nodes are to stay as they are."""
-        return self._belongs_to_another and self.pid is None
 
     @property
     def is_absent(self) -> bool:
@@ -118,10 +112,6 @@ class MemberProcess:
         life = self._lives.up
         states = {} if life is None or life.child is not None else life.states
         return any(node.state in (INACTIVE, ACTIVE) for node in states.values())
-
-    def leave(self) -> None:
-        """Leave its nodes as they are, unless it was started here. Thread-safe."""
-        self._belongs_to_another = True
 
     @property
     def last_report(self) -> SystemReport | None:
@@ -173,6 +163,8 @@ class MemberProcess:
         if life is None or not life.is_up:
             how = "does not run" if life is None else life.lost or "has not reported yet"
             raise ProcessUnavailable(f"{self} {how}")
+        is_ending = self._context.run_state.end_s is not None
+        self.requests.are_last = is_ending and self.pid is not None
         result = self.requests.request(node, transition, after)
         result.add_done_callback(partial(self._on_response, life, node))
         return result

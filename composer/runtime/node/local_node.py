@@ -27,7 +27,12 @@ from composer.runtime.executors.tracebacks import describe
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
 from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
-from composer.runtime.node.managed_node import ManagedNode, NodeListener, TransitionOutcome
+from composer.runtime.node.managed_node import (
+    ManagedNode,
+    NodeListener,
+    RunState,
+    TransitionOutcome,
+)
 from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time import NodeTime
@@ -70,15 +75,14 @@ class LocalNode(ManagedNode):
         statistics: Statistics,
     ) -> None:
         """Continue ``statistics``."""
-        super().__init__(model, loop, statistics, options.transition_timeout_s)
+        super().__init__(model, loop, statistics, options.transition_timeout_s, options.run_state)
         self._listener = listener
-        self._system_is_up = options.system_is_up
         self._start_state = ""  # of the current transition
         recorder = options.router.recorder
         self._ros = self._make_ros_node()
         offers = model.introspection
         log = Log(self._ros, listener.write_log, rosout=offers.rosout, recorder=recorder)
-        self._error_limit = _error_limit(model, listener)
+        self._error_limit = _error_limit(model, listener, options.run_state)
         error_log = ErrorLog(log, loop.clock, self.statistics, listener.on_error, self._error_limit)
         seen = options.seen_messages
         self._context = NodeContext(
@@ -101,7 +105,6 @@ class LocalNode(ManagedNode):
         # Ports that are always on have a gate of their own and share the rest.
         always_on_gate = LifecycleGate(model.full_name, PendingFutures(loop))
         self._always_on_context = replace(self._context, gate=always_on_gate)
-        self._keeps_entities = False
 
     def _join(self) -> None:
         """Join the ROS graph, unconfigured; the parameters are declared."""
@@ -128,12 +131,6 @@ class LocalNode(ManagedNode):
         """Return the node's time in seconds."""
         return self._context.now_s()
 
-    def count_errors(self) -> None:
-        """Count errors as faults from now on: the system is up. Thread-safe."""
-        self._system_is_up = True
-        if self._error_limit is not None and self.state == "active":
-            self._error_limit.start()
-
     def block(self) -> None:
         """Block all ports of a failed node until its next transition. Thread-safe.
 
@@ -157,10 +154,6 @@ class LocalNode(ManagedNode):
     def contexts(self) -> tuple[NodeContext, NodeContext]:
         """What its parts share: those that are gated by *active*, and those that are always on."""
         return self._context, self._always_on_context
-
-    def keep_entities(self) -> None:
-        """Do not destroy ports from now on: the end of the process does."""
-        self._keeps_entities = True
 
     def destroy(self) -> None:
         """Destroy the node in any state. No transition is possible afterwards."""
@@ -261,7 +254,7 @@ class LocalNode(ManagedNode):
             context.gate.unblock_outgoing()
 
     def _resume_error_limit(self, *, restart: bool) -> None:
-        if self._error_limit is None or not self._system_is_up:
+        if self._error_limit is None:
             return
         if restart:
             self._error_limit.start()
@@ -270,7 +263,7 @@ class LocalNode(ManagedNode):
 
     def _release(self, outcome: TransitionOutcome | None = None) -> None:
         self._context.cancel_tasks()
-        if self._keeps_entities:
+        if self._run_state.keeps_entities:
             return
         for port in reversed(tuple(self._entities.ports)):
             try:
@@ -280,10 +273,11 @@ class LocalNode(ManagedNode):
         self._discard(outcome)
 
 
-def _error_limit(model: Node, listener: NodeListener) -> ErrorLimit | None:
+def _error_limit(model: Node, listener: NodeListener, run_state: RunState) -> ErrorLimit | None:
     supervision = model.supervision
     max_errors = supervision.watch.max_errors
     if max_errors is None:
         return None
     window_s = supervision.restart.window_ms / 1000.0
-    return ErrorLimit(max_errors.value, window_s, partial(listener.on_fault, FaultKind.ERRORS))
+    report = partial(listener.on_fault, FaultKind.ERRORS)
+    return ErrorLimit(max_errors.value, window_s, report, lambda: run_state.is_up)

@@ -59,6 +59,23 @@ class NodeListener(Protocol):
         """Receive a line of the log."""
 
 
+@dataclass(slots=True)
+class RunState:
+    """What all nodes of a system follow of its run. Any thread may read and set it.
+
+    ``is_up`` is set after the bring-up: errors count as faults from then on, as some nodes have
+    waited for others before. ``end_s`` (monotonic) is set while the system shuts down: nothing may
+    last longer. With ``leaves_others``, nodes that were not started here keep their states, because
+    another system uses them. With ``keeps_entities``, ports are destroyed by the end of the process
+    only.
+    """
+
+    is_up: bool = False
+    end_s: float | None = None
+    leaves_others: bool = False
+    keeps_entities: bool = False
+
+
 class TransitionLock:
     """Lets one transition of a node run at a time. Thread-safe."""
 
@@ -143,7 +160,14 @@ class ManagedNode(ABC):
 
     lifecycle: ManagedLifecycle
 
-    def __init__(self, model: Node, loop: Loop, statistics: Statistics, timeout_s: float) -> None:
+    def __init__(
+        self,
+        model: Node,
+        loop: Loop,
+        statistics: Statistics,
+        timeout_s: float,
+        run_state: RunState,
+    ) -> None:
         """``timeout_s`` is the limit of each transition."""
         self.model = model
         self.loop = loop
@@ -152,6 +176,7 @@ class ManagedNode(ABC):
         #: When, by the clock of the loop, the work of its last transition started.
         self.transition_started_s = 0.0
         self._timeout_s = timeout_s
+        self._run_state = run_state
 
     @property
     def full_name(self) -> str:
@@ -196,20 +221,8 @@ class ManagedNode(ABC):
         """Return how many messages a publisher has sent, as far as this process knows."""
         return self.statistics.publisher(publisher).count
 
-    def count_errors(self) -> None:
-        """Count errors as faults from now on: the system is up."""
-
     def block(self) -> None:
         """Block all ports of a failed node until its next transition."""
-
-    def leave(self) -> None:
-        """Leave it in its state from now on, if it was not started here: another system uses it."""
-
-    def limit_end(self, end_s: float) -> None:
-        """Let nothing last longer than ``end_s``: the system shuts down."""
-
-    def keep_entities(self) -> None:
-        """Do not destroy ports from now on: the end of the process does."""
 
     @abstractmethod
     def destroy(self) -> None:

@@ -16,6 +16,7 @@ from composer.runtime.callbacks.observers import Chains, MessageSnapshots
 from composer.runtime.executors.sources import EventCounts
 from composer.runtime.host_options import Instruments, Recorder, Tap
 from composer.runtime.intra_process.router import LocalRouter
+from composer.runtime.node.managed_node import RunState
 from composer.runtime.node_time import SimTimeSource
 from composer.runtime.ros.service_requests import limit_type_descriptions
 from composer.runtime.transforms.listener import TransformListeners
@@ -37,8 +38,6 @@ class NodeOptions:
 
     ``router`` connects its ports with those of the other nodes of the process; ``chains`` are
     those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
-    ``system_is_up`` is false during the bring-up, when errors do not count as faults: some nodes
-    wait for others.
     ``make_library_node(node)`` returns the rclpy node that the libraries of its behavior use.
     ``instruments`` belong to a test.
     """
@@ -48,7 +47,7 @@ class NodeOptions:
     process: ProcessContext
     seen_messages: MessageSnapshots | None
     transition_timeout_s: float
-    system_is_up: bool
+    run_state: RunState
     make_library_node: Callable[[Any], Any]
     instruments: Instruments | None
 

@@ -139,7 +139,7 @@ class ComponentNode(StartedNode["LoadedComponent"]):
             if not run.ended.done() and run.container.state == ACTIVE:
                 end_s = self.loop.clock.monotonic() + self._limit_s(self._timeout_s)
                 await self._while_it_runs(run, self._unload(run, end_s))
-                if self._end_s is None:  # it may be loaded again
+                if self._run_state.end_s is None:  # it may be loaded again
                     end_s = self.loop.clock.monotonic() + _GONE_WITHIN_S
                     await self._until(lambda: not self._presence.has_node(self.earlier), end_s)
         except NotAnswered as error:

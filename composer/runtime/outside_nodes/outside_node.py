@@ -31,6 +31,7 @@ from composer.runtime.node.managed_node import (
     ManagedLifecycle,
     ManagedNode,
     NodeListener,
+    RunState,
     TransitionLock,
     TransitionOutcome,
 )
@@ -74,6 +75,7 @@ class OutsideContext:
     timeout_s: float
     log_level: LogLevel
     nodes: Mapping[str, ManagedNode]
+    run_state: RunState
 
 
 class OutsideNode(ManagedNode, ManagedLifecycle):
@@ -83,13 +85,14 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
     """
 
     def __init__(self, model: Node, context: OutsideContext) -> None:
-        ManagedNode.__init__(self, model, context.loop, context.statistics, context.timeout_s)
+        ManagedNode.__init__(
+            self, model, context.loop, context.statistics, context.timeout_s, context.run_state
+        )
         ManagedLifecycle.__init__(self)
         self.lifecycle = self
         self._listener = context.listener
         self._logger = logger_name(model.full_name)
         self._state = UNCONFIGURED
-        self._end_s: float | None = None
         #: Whether it is not there, and its return will be reported.
         self._is_lost = False
         #: Called if it ends by itself, before that is reported.
@@ -114,10 +117,6 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
     def now_s(self) -> float:
         """Return the system time in seconds."""
         return self.loop.clock.time()
-
-    def limit_end(self, end_s: float) -> None:
-        """Let nothing last longer than ``end_s`` from now on."""
-        self._end_s = end_s
 
     @abstractmethod
     def destroy(self) -> None:
@@ -195,7 +194,7 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
 
     async def _until_ready(self, condition: Callable[[], bool], end_s: float) -> bool:
         """Wait for ``condition()`` until ``end_s``, or until the system shuts down."""
-        await self._until(lambda: condition() or self._end_s is not None, end_s)
+        await self._until(lambda: condition() or self._run_state.end_s is not None, end_s)
         return condition()
 
     async def _until(self, condition: Callable[[], bool], end_s: float) -> bool:
@@ -271,7 +270,6 @@ class ExternalNode(ObservedNode):
 
     def __init__(self, model: Node, external: External, context: OutsideContext) -> None:
         super().__init__(model, external, context)
-        self._is_left = False
         self._timer = self.loop.call_every(PERIOD_S, self._check)
 
     @property
@@ -284,12 +282,8 @@ class ExternalNode(ObservedNode):
         self._timer.cancel()
         self._close_remote()
 
-    def leave(self) -> None:
-        """Leave it in its state from now on: another system uses it. Thread-safe."""
-        self._is_left = True
-
     async def _work(self, transition: str) -> None:
-        if self._is_left:
+        if self._run_state.leaves_others:
             return
         if self._outside.is_managed and transition != "shutdown":
             await self._work_managed(transition)

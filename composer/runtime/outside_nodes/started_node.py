@@ -5,6 +5,7 @@ Those of components are in ``component_node``.
 
 from __future__ import annotations
 
+import math
 import os
 from abc import abstractmethod
 from collections.abc import Coroutine, Mapping
@@ -168,9 +169,14 @@ class StartedNode(ObservedNode, Generic[R]):
 
     def _limit_s(self, limit_s: float) -> float:
         """Return a time limit in seconds, shortened while the system shuts down."""
-        if self._end_s is None:
-            return limit_s
-        return min(limit_s, max(0.0, self._end_s - self.loop.clock.monotonic()) * END_SHARE)
+        return min(limit_s, self._left_s())
+
+    def _left_s(self) -> float:
+        """Return how long something may take: a share of the time for the shutdown, if any."""
+        end_s = self._run_state.end_s
+        if end_s is None:
+            return math.inf
+        return max(0.0, end_s - self.loop.clock.monotonic()) * END_SHARE
 
     # --- its end
 
@@ -321,10 +327,7 @@ class ExecutableNode(StartedNode[Child]):
         """How long to wait after SIGINT and after SIGTERM; less if the system shuts down."""
         terminate_s = self._executable.sigterm_timeout_ms / 1000.0
         kill_s = self._executable.sigkill_timeout_ms / 1000.0
-        if self._end_s is None:
-            return terminate_s, kill_s
-        left_s = max(0.0, self._end_s - self.loop.clock.monotonic()) * END_SHARE
-        share = min(1.0, left_s / max(terminate_s + kill_s, 1e-3))
+        share = min(1.0, self._left_s() / max(terminate_s + kill_s, 1e-3))
         return terminate_s * share, kill_s * share
 
     def _how_ended(self, run: Child) -> str:

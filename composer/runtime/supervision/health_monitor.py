@@ -78,18 +78,11 @@ class HealthMonitor:
         self._silent: dict[str, _Activation] = {}  # nodes that were reported in their activation
         self._period_s = _period_s(context.node_set)
         self._time = CheckTime(self._period_s, self._clock.monotonic())
-        self._system_is_up = False
         self._thread = threading.Thread(target=self._run, name="health monitor", daemon=True)
 
     def start(self) -> None:
         """Start the thread."""
         self._clock.start(self._thread)
-
-    def system_is_up(self) -> None:
-        """Check silence and errors from now on: during the bring-up, some nodes wait for others."""
-        self._system_is_up = True
-        for node in self._context.node_set.nodes.values():
-            node.count_errors()
 
     def stop(self) -> None:
         """Stop the thread."""
@@ -104,7 +97,7 @@ class HealthMonitor:
             check_s = self._time.advance(now_s)
             self._check_callbacks(check_s)
             self._check_hung_loops(check_s)
-            if self._system_is_up:
+            if self._context.node_set.run_state.is_up:
                 self._check_silences(now_s)
 
     def _check_silences(self, now_s: float) -> None:

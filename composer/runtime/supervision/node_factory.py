@@ -31,6 +31,7 @@ from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import (
     ManagedNode,
     NodeListener,
+    RunState,
 )
 from composer.runtime.node.node import RunningNode
 from composer.runtime.node.options import NodeOptions, ProcessContext
@@ -71,6 +72,7 @@ class NodeFactory:
         self._log_exception = exception_log(self.clock, write_log)
         self.chains = Chains(system, self.clock, tracing=options.tracing)
         self.children = ChildProcesses()
+        self.run_state = RunState()
         namespace = join(system.namespace, system.name.value)
         self.other_processes = OtherProcesses(
             system, namespace, options.member_command, write_log, together
@@ -109,7 +111,7 @@ class NodeFactory:
             process=self._process,
             seen_messages=self._seen_messages,
             transition_timeout_s=self._timeout_s(node),
-            system_is_up=before is not None,
+            run_state=self.run_state,
             make_library_node=partial(NodeOfBehavior, parameters={}),
             instruments=self._options.instruments,
         )
@@ -130,11 +132,10 @@ class NodeFactory:
             timeout_s=self._timeout_s(node),
             log_level=self._log_level_of(node),
             nodes=self._nodes,
+            run_state=self.run_state,
         )
         if node.process is not None:
-            process = self.other_processes.process(
-                node.process.value, context.loop, self._process, self.children
-            )
+            process = self.other_processes.process(node.process.value, context)
             return MemberNode(node, process, context)
         if node.external is not None:
             return ExternalNode(node, node.external, context)

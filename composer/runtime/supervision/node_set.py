@@ -51,9 +51,10 @@ class NodeSet:
         self._turn_watch = TurnWatch(self.loops.values)
         #: The loops with a callback that does not return; their nodes cannot do anything.
         self.hung: set[str] = set()
-        self._keeps_entities = False
         #: The other processes of the system, as far as nodes were created in them.
         self.other_processes = factory.other_processes
+        #: What the nodes follow.
+        self.run_state = factory.run_state
         #: The names of the other processes, by the keys of the nodes that they run.
         self.process_of: Mapping[str, str] = {
             node.name.value: node.process.value for node in system.nodes if node.process is not None
@@ -192,23 +193,6 @@ class NodeSet:
             return f"cannot be created again: {describe(error)}"
         return None
 
-    def leave_others(self) -> None:
-        """Leave nodes alone that were not started here. Thread-safe."""
-        for node in tuple(self.nodes.values()):
-            node.leave()
-
-    def limit_end(self, end_s: float) -> None:
-        """Pass on that the system shuts down until ``end_s`` (monotonic)."""
-        for node in self.nodes.values():
-            node.limit_end(end_s)
-        self.other_processes.limit_end()
-
-    def keep_entities(self) -> None:
-        """Do not destroy entities from now on: the end of the process does."""
-        self._keeps_entities = True
-        for node in self.nodes.values():
-            node.keep_entities()
-
     def stop_loops(self, end_s: float) -> None:
         """Stop the threads of the nodes until ``end_s`` (monotonic); the others are ``hung``.
 
@@ -230,7 +214,7 @@ class NodeSet:
         """
         self.other_processes.close()
         self._factory.children.close(end_s)
-        if self._keeps_entities:
+        if self.run_state.keeps_entities:
             return False
         complete = not self.hung
         for name in reversed(self.nodes):

@@ -133,7 +133,7 @@ class SystemEnd:
     def keep_entities(self) -> None:
         """Leave the entities of the nodes to the end of the process, if that is faster."""
         if self.uses_fast_exit and supports_fast_exit():
-            self._context.node_set.keep_entities()
+            self._context.node_set.run_state.keeps_entities = True
 
     def tear_down(self, *, is_created: bool) -> None:
         """Lead the nodes down, if all of them were created."""
@@ -149,7 +149,7 @@ class SystemEnd:
         self.keep_entities()
         stop_within_s = self._options.stop_within_s
         self._end_s = self._context.clock.monotonic() + stop_within_s
-        self._context.node_set.limit_end(self._end_s)
+        self._context.node_set.run_state.end_s = self._end_s
         self._context.node_set.other_processes.forget_goals()
         if is_created:
             limit_s = _STEP_SHARE * stop_within_s
