@@ -15,7 +15,7 @@ from composer.runtime.members import node as member_node
 from composer.runtime.members.lives import NodeFigures, ProcessUnavailable
 from composer.runtime.members.node import MemberNode
 from composer.runtime.metrics.statistics import Statistics
-from composer.runtime.node.managed_node import TransitionOutcome
+from composer.runtime.node.managed_node import RunState, TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import OutsideContext
 from composer.runtime.protocol.reports import NodeReport
 from composer.runtime.protocol.requests import StepResult
@@ -29,7 +29,6 @@ class Process:
 
     moved_s = 0.0
     pid = 1
-    is_left = False
 
     def __init__(self) -> None:
         self.killed = ""
@@ -71,7 +70,9 @@ def failed_node(on: Bench, process: Any, folder: Path, listener: Any) -> MemberN
     model = next(n for n in system_of(TEXT, folder, detector=DETECTOR).nodes if n.process)
     nothing: Any = None
     context = OutsideContext(
-        on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO, nodes={}
+        *(on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO),
+        nodes={},
+        run_state=RunState(),
     )
     node = MemberNode(model, process, context)
     report(on, node, "active")

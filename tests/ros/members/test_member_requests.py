@@ -21,6 +21,7 @@ from composer.runtime.members import requests as member_requests
 from composer.runtime.members.lives import MemberContext, ProcessUnavailable
 from composer.runtime.members.process import MemberProcess
 from composer.runtime.members.requests import MemberRequests
+from composer.runtime.node.managed_node import RunState
 from composer.runtime.node.options import ProcessContext
 from composer.runtime.process.instance_lock import hold_instance_lock
 from composer.runtime.protocol.codec import ProtocolError
@@ -232,6 +233,7 @@ def silent_process(
         namespace="/robot",
         command=command,
         write_log=lambda *_: None,
+        run_state=RunState(),
     )
     return MemberProcess(system.processes[0], context)
 
