@@ -21,7 +21,6 @@ from composer.model import USE_SIM_TIME, BehaviorReference, HostedClass, Node, P
 from composer.model.interface_packages import how_to_get
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.executors.futures import Cancelled
-from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.strand import ExclusiveStrand, InlineStrand, Strand
 from composer.runtime.executors.tracebacks import calls_user_code
 from composer.runtime.hosting.adopted_node import AdoptedNode, adopted, is_managed
@@ -41,10 +40,9 @@ from composer.runtime.hosting.instance import (
     changed_parameters,
 )
 from composer.runtime.hosting.user_code import ThreadedCall, end_callbacks
-from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class, plain_name
 from composer.runtime.node.local_node import LocalNode
-from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.node.node import WrongReturn
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameters import declare, ros_parameters
@@ -63,18 +61,11 @@ class HostedNode(LocalNode):
 
     _entities: PortSet
 
-    def __init__(
-        self,
-        model: Node,
-        loop: Loop,
-        options: NodeOptions,
-        listener: NodeListener,
-        statistics: Statistics,
-    ) -> None:
-        """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
+    def __init__(self, model: Node, options: NodeOptions) -> None:
+        """Join the ROS graph, unconfigured. Raises ParameterError."""
         install()
         self._hosted = cast("HostedClass", model.hosted_class)
-        super().__init__(model, loop, options, listener, statistics)
+        super().__init__(model, options)
         self._entities = PortSet()
         self._instance: Instance | None = None
         #: The parameters as the model or the last instance has declared them, until the next one.

@@ -20,19 +20,12 @@ from composer.plan import FaultKind
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.log import ErrorLimit, ErrorLog, Log
 from composer.runtime.callbacks.observers import MutationCheck
-from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import rclpy_callback
 from composer.runtime.executors.strand import InlineStrand, SerialStrand, Strand
 from composer.runtime.executors.tracebacks import describe
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, PendingFutures
-from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.lifecycle import Lifecycle
-from composer.runtime.node.managed_node import (
-    ManagedNode,
-    NodeListener,
-    RunState,
-    TransitionOutcome,
-)
+from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
 from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
 from composer.runtime.node_time import NodeTime
@@ -66,23 +59,15 @@ class LocalNode(ManagedNode):
     _entities: PortSet
     lifecycle: Lifecycle
 
-    def __init__(
-        self,
-        model: Node,
-        loop: Loop,
-        options: NodeOptions,
-        listener: NodeListener,
-        statistics: Statistics,
-    ) -> None:
-        """Continue ``statistics``."""
-        super().__init__(model, loop, statistics, options.transition_timeout_s, options.run_state)
-        self._listener = listener
+    def __init__(self, model: Node, options: NodeOptions) -> None:
+        super().__init__(model, options)
+        loop, listener = options.loop, options.listener
         self._start_state = ""  # of the current transition
         recorder = options.router.recorder
         self._ros = self._make_ros_node()
         offers = model.introspection
         log = Log(self._ros, listener.write_log, rosout=offers.rosout, recorder=recorder)
-        self._error_limit = _error_limit(model, listener, options.run_state)
+        self._error_limit = _error_limit(model, options)
         error_log = ErrorLog(log, loop.clock, self.statistics, listener.on_error, self._error_limit)
         seen = options.seen_messages
         self._context = NodeContext(
@@ -273,11 +258,11 @@ class LocalNode(ManagedNode):
         self._discard(outcome)
 
 
-def _error_limit(model: Node, listener: NodeListener, run_state: RunState) -> ErrorLimit | None:
+def _error_limit(model: Node, options: NodeOptions) -> ErrorLimit | None:
     supervision = model.supervision
     max_errors = supervision.watch.max_errors
     if max_errors is None:
         return None
     window_s = supervision.restart.window_ms / 1000.0
-    report = partial(listener.on_fault, FaultKind.ERRORS)
-    return ErrorLimit(max_errors.value, window_s, report, lambda: run_state.is_up)
+    report = partial(options.listener.on_fault, FaultKind.ERRORS)
+    return ErrorLimit(max_errors.value, window_s, report, lambda: options.run_state.is_up)

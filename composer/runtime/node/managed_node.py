@@ -76,6 +76,20 @@ class RunState:
     keeps_entities: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class ManagedContext:
+    """What a node gets of its system, whatever implements it.
+
+    It continues ``statistics``. ``timeout_s`` is the limit of each transition.
+    """
+
+    loop: Loop
+    listener: NodeListener
+    statistics: Statistics
+    timeout_s: float
+    run_state: RunState
+
+
 class TransitionLock:
     """Lets one transition of a node run at a time. Thread-safe."""
 
@@ -160,23 +174,16 @@ class ManagedNode(ABC):
 
     lifecycle: ManagedLifecycle
 
-    def __init__(
-        self,
-        model: Node,
-        loop: Loop,
-        statistics: Statistics,
-        timeout_s: float,
-        run_state: RunState,
-    ) -> None:
-        """``timeout_s`` is the limit of each transition."""
+    def __init__(self, model: Node, context: ManagedContext) -> None:
         self.model = model
-        self.loop = loop
-        self.statistics = statistics
+        self.loop = context.loop
+        self.statistics = context.statistics
         self.activations = 0  # how often it became active
         #: When, by the clock of the loop, the work of its last transition started.
         self.transition_started_s = 0.0
-        self._timeout_s = timeout_s
-        self._run_state = run_state
+        self._listener = context.listener
+        self._timeout_s = context.timeout_s
+        self._run_state = context.run_state
 
     @property
     def full_name(self) -> str:

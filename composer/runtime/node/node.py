@@ -29,10 +29,8 @@ from composer.runtime.callbacks.reactions import (
     ReactionClient,
     RunningReaction,
 )
-from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tracebacks import calls_user_code, shown
 from composer.runtime.intra_process.publisher import GatedPublisher
-from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.behavior_loader import (
     NodeClock,
     ParameterValues,
@@ -41,7 +39,7 @@ from composer.runtime.node.behavior_loader import (
     named_ports,
 )
 from composer.runtime.node.local_node import LibraryNode, LocalNode
-from composer.runtime.node.managed_node import NodeListener, TransitionOutcome
+from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.node.options import NodeOptions
 from composer.runtime.node.parameters import NodeParameters
 from composer.runtime.node.transforms import Broadcasts, NodeTransforms
@@ -76,16 +74,9 @@ class RunningNode(LocalNode):
 
     _entities: NodeEntities
 
-    def __init__(
-        self,
-        model: Node,
-        loop: Loop,
-        options: NodeOptions,
-        listener: NodeListener,
-        statistics: Statistics,
-    ) -> None:
-        """Join the ROS graph, unconfigured; continue ``statistics``. Raises ParameterError."""
-        super().__init__(model, loop, options, listener, statistics)
+    def __init__(self, model: Node, options: NodeOptions) -> None:
+        """Join the ROS graph, unconfigured. Raises ParameterError."""
+        super().__init__(model, options)
         self._behavior: Any = None
         self._cleaned_up_behavior: Any = None  # for ``on_shutdown``
         self._failures: list[str] | None = None  # reported while a lifecycle handler runs

@@ -16,7 +16,7 @@ from composer.runtime.callbacks.observers import Chains, MessageSnapshots
 from composer.runtime.executors.sources import EventCounts
 from composer.runtime.host_options import Instruments, Recorder, Tap
 from composer.runtime.intra_process.router import LocalRouter
-from composer.runtime.node.managed_node import RunState
+from composer.runtime.node.managed_node import ManagedContext
 from composer.runtime.node_time import SimTimeSource
 from composer.runtime.ros.service_requests import limit_type_descriptions
 from composer.runtime.transforms.listener import TransformListeners
@@ -33,8 +33,8 @@ class ProcessContext:
 
 
 @dataclass(frozen=True, slots=True)
-class NodeOptions:
-    """How a node is run.
+class NodeOptions(ManagedContext):
+    """How a node of this process is run.
 
     ``router`` connects its ports with those of the other nodes of the process; ``chains`` are
     those of the system; ``seen_messages`` is set if messages are checked for changes by callbacks;
@@ -46,8 +46,6 @@ class NodeOptions:
     chains: Chains
     process: ProcessContext
     seen_messages: MessageSnapshots | None
-    transition_timeout_s: float
-    run_state: RunState
     make_library_node: Callable[[Any], Any]
     instruments: Instruments | None
 

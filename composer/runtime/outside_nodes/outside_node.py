@@ -23,15 +23,12 @@ from composer.model.names import split_node_name
 from composer.runtime.callbacks.log import logger_name
 from composer.runtime.children.child_processes import ChildProcesses
 from composer.runtime.executors.futures import Cancelled
-from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.tasks import sleep
 from composer.runtime.executors.tracebacks import describe
-from composer.runtime.metrics.statistics import Statistics
 from composer.runtime.node.managed_node import (
+    ManagedContext,
     ManagedLifecycle,
     ManagedNode,
-    NodeListener,
-    RunState,
     TransitionLock,
     TransitionOutcome,
 )
@@ -60,22 +57,17 @@ class TransitionRefused(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class OutsideContext:
+class OutsideContext(ManagedContext):
     """What a node outside the process uses in this process.
 
-    ``manager`` is the ROS node that observes and calls it; ``timeout_s`` the limit of each of its
-    transitions. ``nodes`` are the nodes of the process, by their keys.
+    ``manager`` is the ROS node that observes and calls it. ``nodes`` are the nodes of the process,
+    by their keys.
     """
 
-    loop: Loop
     manager: RosNode
     children: ChildProcesses
-    listener: NodeListener
-    statistics: Statistics
-    timeout_s: float
     log_level: LogLevel
     nodes: Mapping[str, ManagedNode]
-    run_state: RunState
 
 
 class OutsideNode(ManagedNode, ManagedLifecycle):
@@ -85,12 +77,9 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
     """
 
     def __init__(self, model: Node, context: OutsideContext) -> None:
-        ManagedNode.__init__(
-            self, model, context.loop, context.statistics, context.timeout_s, context.run_state
-        )
+        ManagedNode.__init__(self, model, context)
         ManagedLifecycle.__init__(self)
         self.lifecycle = self
-        self._listener = context.listener
         self._logger = logger_name(model.full_name)
         self._state = UNCONFIGURED
         #: Whether it is not there, and its return will be reported.

@@ -102,38 +102,34 @@ class NodeFactory:
         statistics = (
             Statistics(tracing=self._options.tracing) if before is None else before.statistics
         )
+        loop = self._loop_of(self._executor_of(node))
+        common = loop, self._make_listener(node), statistics, self._timeout_s(node), self.run_state
         if not node.in_process:
-            return self._make_outside(node, statistics)
-        executor = self._executor_of(node)
+            return self._make_outside(
+                node,
+                OutsideContext(
+                    *common,
+                    manager=self._process.manager,
+                    children=self.children,
+                    log_level=self._log_level_of(node),
+                    nodes=self._nodes,
+                ),
+            )
         options = NodeOptions(
+            *common,
             chains=self.chains,
             router=self._router,
             process=self._process,
             seen_messages=self._seen_messages,
-            transition_timeout_s=self._timeout_s(node),
-            run_state=self.run_state,
             make_library_node=partial(NodeOfBehavior, parameters={}),
             instruments=self._options.instruments,
         )
         if before is None:  # else the level may have been changed at run time
             set_level(node.full_name, self._log_level_of(node))
-        loop = self._loop_of(executor)
         kind = RunningNode if node.hosted_class is None else HostedNode
-        return kind(node, loop, options, self._make_listener(node), statistics)
+        return kind(node, options)
 
-    def _make_outside(self, node: Node, statistics: Statistics) -> ManagedNode:
-        name = Located(_OUTSIDE, node.span)
-        context = OutsideContext(
-            loop=self._loop_of(Executor(name, ExecutorKind.EVENTS, node.span)),
-            manager=self._process.manager,
-            children=self.children,
-            listener=self._make_listener(node),
-            statistics=statistics,
-            timeout_s=self._timeout_s(node),
-            log_level=self._log_level_of(node),
-            nodes=self._nodes,
-            run_state=self.run_state,
-        )
+    def _make_outside(self, node: Node, context: OutsideContext) -> ManagedNode:
         if node.process is not None:
             process = self.other_processes.process(node.process.value, context)
             return MemberNode(node, process, context)
@@ -164,8 +160,11 @@ class NodeFactory:
         """Return the executor that runs the node: by default ``default``, an event loop.
 
         A hosted class has an event loop of its own by default: its callbacks may block. In virtual
-        time, each class has one, and all other nodes have one together.
+        time, each class has one, and all other nodes have one together. One loop drives all nodes
+        outside the process.
         """
+        if not node.in_process:
+            return Executor(Located(_OUTSIDE, node.span), ExecutorKind.EVENTS, node.span)
         is_virtual = self.clock.is_virtual
         if node.executor is not None and not is_virtual:
             return self.executors[node.executor.value]
