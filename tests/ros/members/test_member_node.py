@@ -70,9 +70,8 @@ def failed_node(on: Bench, process: Any, folder: Path, listener: Any) -> MemberN
     model = next(n for n in system_of(TEXT, folder, detector=DETECTOR).nodes if n.process)
     nothing: Any = None
     context = OutsideContext(
-        *(on.loop, nothing, nothing, listener, Statistics(), 20.0, LogLevel.INFO),
-        nodes={},
-        run_state=RunState(),
+        *(on.loop, listener, Statistics(), 20.0, RunState(), nothing, nothing),
+        *(LogLevel.INFO, {}),
     )
     node = MemberNode(model, process, context)
     report(on, node, "active")
