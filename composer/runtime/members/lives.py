@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node as RosNode
 from std_msgs.msg import String
@@ -36,6 +36,9 @@ from composer.runtime.protocol.codec import ProtocolError, decode
 from composer.runtime.protocol.reports import NodeReport, SystemReport, is_signed, split_signature
 from composer.runtime.protocol.requests import NAME, STATE_TOPIC
 from composer.runtime.ros.service_requests import STATE_QOS
+
+if TYPE_CHECKING:
+    from composer.runtime.members.node import MemberNode
 
 #: Processes report every second. One that has not reported for this time is lost.
 REPORTS_WITHIN_S = 5.0
@@ -116,8 +119,8 @@ class NodeFigures:
         self._reported: dict[str, Any] = {}
         self._counts: Counter[str] = Counter()  # of the last report
         self._earlier: Counter[str] = Counter()  # counted by earlier lives
-        self._known = False
-        self._before: Counter[str] = Counter()  # counted before this process was there
+        #: Counted before this process was there; None before the first report.
+        self._before: Counter[str] | None = None
 
     def take(self, node: NodeReport, host: str, *, is_started_here: bool) -> None:
         """Receive what the process, on a host, reports of the node."""
@@ -126,8 +129,7 @@ class NodeFigures:
         self._counts = Counter({name: getattr(node, name) for name in _COUNTS})
         for name in _COUNTS_BY_NAME:
             self._counts[name] = sum(getattr(node, name).values())
-        if not self._known:
-            self._known = True
+        if self._before is None:
             self._before = Counter() if is_started_here else self._counts
 
     def end_life(self) -> None:
@@ -145,7 +147,7 @@ class NodeFigures:
     @property
     def since_start(self) -> Mapping[str, int]:
         """The counters since this process knows the node."""
-        return self._counts + self._earlier - self._before
+        return self._counts + self._earlier - (self._before or Counter())
 
 
 class MemberLives:
@@ -156,21 +158,22 @@ class MemberLives:
         name: str,
         label: str,
         context: MemberContext,
+        members: Mapping[str, MemberNode],
         on_failure: Callable[[str, bool], None],
     ) -> None:
         """``name`` is the namespace of the manager of the process, ``label`` the name in messages.
 
+        ``members`` are the nodes of the process, by their full names.
         ``on_failure(reason, is_expected)`` is called when a life ends or is lost.
         """
         self._name = name
         self._label = label
         self._context = context
+        self._members = members
         self._on_failure = on_failure
         self.current: MemberLife | None = None  # from the start, or the first report, to the end
         #: The last report of all lives.
         self.last_report: SystemReport | None = None
-        #: The figures of each node of the process.
-        self.figures: dict[str, NodeFigures] = {}
         self.may_start = bool(context.command)
         self.is_ending = False
         self._clock = context.loop.clock
@@ -211,9 +214,10 @@ class MemberLives:
         life.last, life.reported_s = report, self._clock.monotonic()
         self.last_report = report
         for node in report.nodes:
-            if node.node in self.figures:
+            member = self._members.get(node.node)
+            if member is not None:
                 is_child = life.child is not None
-                self.figures[node.node].take(node, report.host, is_started_here=is_child)
+                member.all_figures.take(node, report.host, is_started_here=is_child)
 
     def warn(self, text: str) -> None:
         """Log a warning about the process."""
@@ -247,8 +251,8 @@ class MemberLives:
         return life
 
     def _end_counts(self) -> None:
-        for figures in self.figures.values():
-            figures.end_life()
+        for member in self._members.values():
+            member.all_figures.end_life()
 
     def _check(self) -> None:
         """Notice a process that does not report: it hangs, or is cut off."""

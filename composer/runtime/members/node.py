@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from composer.model import Node
@@ -17,10 +17,9 @@ from composer.model.lifecycle import (
     last_transition,
 )
 from composer.plan import Condition
-from composer.runtime.clock import Clock
 from composer.runtime.executors.futures import Future
 from composer.runtime.executors.tasks import wait_for
-from composer.runtime.members.lives import ProcessUnavailable
+from composer.runtime.members.lives import NodeFigures, ProcessUnavailable
 from composer.runtime.members.process import STARTS_WITHIN_S, MemberProcess
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.outside_nodes.outside_node import (
@@ -49,11 +48,12 @@ class MemberNode(OutsideNode):
         self._reported = ""  # the last primary state
         self._is_moving = False  # according to the last report
         self._awaited: tuple[str, Future[None]] | None = None  # the goal of a transition
-        self._after: Sequence[str] = ()
         self._has_failed = False
         self._has_finished = False
-        self._late_reports: _LateReports | None = None  # while it is awaited to be taken down
-        self._is_lost = False  # its process has ended, and its return has not been reported
+        self._late_from_s = math.inf  # when it should have begun to move, by the clock of the loop
+        self._late_reports = 0  # since then
+        #: Its figures over all lives of its process.
+        self.all_figures = NodeFigures()
         self._given_up: set[str] = set()  # goals of requests that may still arrive after a cut
         process.add(self)
 
@@ -70,12 +70,11 @@ class MemberNode(OutsideNode):
     @property
     def figures(self) -> Mapping[str, Any]:
         """What the process reports of the node, by the names of the fields of ``NodeReport``."""
-        return self._process.figures(self.full_name).current
+        return self.all_figures.current
 
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Its counters since this process knows it."""
-        return self._process.figures(self.full_name).since_start
+    def count(self, counter: str) -> int:
+        """Return a counter of the node since this process knows it."""
+        return self.all_figures.since_start.get(counter, 0)
 
     @property
     def is_absent(self) -> bool:
@@ -89,13 +88,6 @@ class MemberNode(OutsideNode):
 
     def destroy(self) -> None:
         """Do nothing: the node belongs to its process."""
-
-    async def run_step_after(
-        self, after: Sequence[str], transition: str, is_outdated: Callable[[], bool]
-    ) -> TransitionOutcome:
-        """Run the ``transition`` of a plan; its process lets the nodes ``after`` move before it."""
-        self._after = after
-        return await self.run_step(transition, is_outdated)
 
     async def create_again(self, is_outdated: Callable[[], bool]) -> str | None:
         """Let its process create it again if it is finalized; return why that failed, or None.
@@ -158,12 +150,13 @@ class MemberNode(OutsideNode):
         reports are missing, the whole process may hang, or this computer was busy: it is lost then,
         see :class:`.MemberProcess`.
         """
-        self._late_reports = late = _LateReports(self.loop.clock)
+        now_s = self.loop.clock.monotonic()
+        self._late_from_s, self._late_reports = now_s + REPORTED_WITHIN_S, 0
         await self._until(
-            lambda: self._is_down() or self._is_moving or late.are_enough,
-            self.loop.clock.monotonic() + STARTS_WITHIN_S,
+            # The first late report may be older, and have waited in this process.
+            lambda: self._is_down() or self._is_moving or self._late_reports > 1,
+            now_s + STARTS_WITHIN_S,
         )
-        self._late_reports = None
         left_s = self._timeout_s if self._is_moving else 0.0
         return await self._until(self._is_down, self.loop.clock.monotonic() + left_s)
 
@@ -255,8 +248,7 @@ class MemberNode(OutsideNode):
         self._is_moving = not is_primary
         if is_primary:
             self._reported = state
-        if self._late_reports is not None:
-            self._late_reports.count()
+        self._late_reports += self.loop.clock.monotonic() >= self._late_from_s
         if self._awaited is not None and self._awaited[0] == state:
             self._awaited[1].set_result(None)
         failed_now = bool(reported.held_down) and not self._has_failed
@@ -267,16 +259,20 @@ class MemberNode(OutsideNode):
         has_moved = is_primary and state not in (self._state, before) and before == self._state
         if failed_now or (has_moved and self._has_failed):  # again, without a report in between
             self._fail(reported.held_down)  # its process takes it down
+        elif has_moved and state in self._given_up:
+            # Requested here before the process was lost, and not by a user: as after its return.
+            self._given_up.clear()
+            self._use_again()
+            self._listener.on_returned()
         elif has_moved:
-            self._follow(state)
+            self._follow(last_transition(self._state, state), state)
 
     def on_process_end(self, reason: str) -> None:
         """Report the end of the process as a failure of the node."""
         self._reported, self._is_moving, self._has_failed = "", False, False
         if not self._lock.is_held and self._state in (INACTIVE, ACTIVE):
             self._is_lost = True
-            self._state = UNCONFIGURED
-            self._listener.on_ended(reason, UNCONFIGURED, is_awaited=self.is_absent)
+            self._fail(reason, is_awaited=self.is_absent)
 
     def on_process_return(self) -> None:
         """Use the node again, in the state in which its process has kept it."""
@@ -284,53 +280,20 @@ class MemberNode(OutsideNode):
             return
         self._is_lost = False
         if not self._lock.is_held and self._reported in (INACTIVE, ACTIVE):
-            self._state = self._reported
-            self._listener.on_transition_end(
-                TransitionOutcome("return", self._state, success=True, requested=False)
-            )
+            self._use_again()
         self._listener.on_returned()
 
     def take_over(self) -> None:
         """Use the node in the state in which an earlier coordinating process has left it."""
         self._is_lost = True
         if self._process.is_absent:
-            self._listener.on_ended(f"{self._process} does not run", UNCONFIGURED, is_awaited=True)
+            self._listener.on_ended(f"{self._process} does not run", is_awaited=True)
         else:
             self.on_process_return()
 
-    def _follow(self, state: str) -> None:
-        """Report a transition that another tool has requested from the node itself.
-
-        If it was requested here before the process was lost, it is given up by now: the node is
-        used again in its state, as after the return of its process.
-        """
-        if state in self._given_up:
-            self._given_up.clear()
-            self._state = state
-            outcome = TransitionOutcome("return", state, success=True, requested=False)
-            self._listener.on_transition_end(outcome)
-            self._listener.on_returned()
-            return
-        transition = last_transition(self._state, state)
-        self._state = state
-        self.activations += state == ACTIVE
-        self._listener.on_transition_end(TransitionOutcome(transition, state, success=True))
-
-
-class _LateReports:
-    """Counts the reports of a node after the time in which it should have begun to move.
-
-    The first of them may be older, and have waited in this process.
-    """
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._due_s = clock.monotonic() + REPORTED_WITHIN_S
-        self._count = 0
-
-    def count(self) -> None:
-        self._count += self._clock.monotonic() >= self._due_s
-
-    @property
-    def are_enough(self) -> bool:
-        return self._count > 1
+    def _use_again(self) -> None:
+        """Use the node in the state in which its process reports it."""
+        self._state = self._reported
+        self._listener.on_transition_end(
+            TransitionOutcome("return", self._state, success=True, requested=False)
+        )

@@ -28,7 +28,6 @@ from composer.runtime.members.lives import (
     MemberLife,
     MemberLives,
     MemberReports,
-    NodeFigures,
     ProcessUnavailable,
 )
 from composer.runtime.members.requests import MemberRequests
@@ -60,7 +59,7 @@ class MemberProcess:
         self._members: dict[str, MemberNode] = {}
         #: When, by the clock of the loop, it last reported that a node has moved.
         self.moved_s = 0.0
-        self._lives = MemberLives(self._name, str(self), context, self._fail)
+        self._lives = MemberLives(self._name, str(self), context, self._members, self._fail)
         self._starting: Future[None] | None = None
         self.requests = MemberRequests(
             context.manager,
@@ -74,9 +73,8 @@ class MemberProcess:
         )
 
     def add(self, member: MemberNode) -> None:
-        """Add a node, in place of an earlier one of the same name."""
+        """Add a node."""
         self._members[member.full_name] = member
-        self._lives.figures.setdefault(member.full_name, NodeFigures())
 
     @property
     def pid(self) -> int | None:
@@ -117,10 +115,6 @@ class MemberProcess:
     def last_report(self) -> SystemReport | None:
         """Its last report. Once its end was requested, that includes timings."""
         return self._lives.last_report
-
-    def figures(self, node: str) -> NodeFigures:
-        """Return the rates and counters of a node."""
-        return self._lives.figures[node]
 
     def is_report_due(self, node: str) -> bool:
         """Return whether the last report may be older than the last response about a node."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.base.fast_dataclass import dataclass
@@ -46,8 +46,8 @@ class NodeListener(Protocol):
     def on_fault(self, kind: FaultKind, text: str) -> None:
         """Receive that the node has failed: it says so, or has exceeded its ``max_errors``."""
 
-    def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
-        """Receive that a node outside the process has ended by itself, and its new state.
+    def on_ended(self, text: str, *, is_awaited: bool = False) -> None:
+        """Receive that a node outside the process has ended by itself, and is unconfigured now.
 
         With ``is_awaited``, it cannot be started from here, and its return will be reported.
         """
@@ -128,6 +128,7 @@ class ManagedLifecycle(ABC):
 
     def __init__(self) -> None:
         self._lock = TransitionLock()
+        self._after: Sequence[str] = ()  # of the step that runs
 
     @property
     @abstractmethod
@@ -144,13 +145,17 @@ class ManagedLifecycle(ABC):
         await self._lock.acquire()
         return await self._run(transition, requested=True)
 
-    async def run_step(self, transition: str, is_outdated: Callable[[], bool]) -> TransitionOutcome:
+    async def run_step(
+        self, transition: str, is_outdated: Callable[[], bool], after: Sequence[str] = ()
+    ) -> TransitionOutcome:
         """Run the ``transition`` of a plan as soon as no other one runs.
 
-        If ``is_outdated()`` then, do not run it: a requested transition came first.
+        If ``is_outdated()`` then, do not run it: a requested transition came first. The process of
+        a node lets the nodes ``after``, which are in it as well, move before; see MemberNode.
         """
         await self._lock.acquire()
         if not is_outdated():
+            self._after = after
             return await self._run(transition, requested=False)
         self._lock.release()
         reason = "a requested transition came first"
@@ -227,6 +232,10 @@ class ManagedNode(ABC):
     def sent(self, publisher: str) -> int:
         """Return how many messages a publisher has sent, as far as this process knows."""
         return self.statistics.publisher(publisher).count
+
+    def count(self, counter: str) -> int:
+        """Return a counter of the node, by its name in a ``NodeSummary``."""
+        return int(getattr(self.statistics, counter))
 
     def block(self) -> None:
         """Block all ports of a failed node until its next transition."""

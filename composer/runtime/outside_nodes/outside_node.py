@@ -166,19 +166,23 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         self._state = UNCONFIGURED
         for follow in tuple(self.followers):
             follow()
-        self._listener.on_ended(reason, UNCONFIGURED, is_awaited=is_awaited)
+        self._listener.on_ended(reason, is_awaited=is_awaited)
 
     def _on_state(self, start: str, state: str) -> None:
-        """Follow a transition that another tool has requested from the node itself."""
+        """Follow a transition event and the state after it."""
         if self._lock.is_held or self._state in (state, FINALIZED):
             return
         transition = _BY_DURING.get(start) or last_transition(self._state, state)
         success = start != _AFTER_ERROR and state in DONE_IN[transition]
         reason = "" if success else "a transition that another tool requested has failed"
+        self._follow(transition, state, reason)
+
+    def _follow(self, transition: str, state: str, reason: str = "") -> None:
+        """Report a transition that another tool has requested from the node itself."""
         self._state = state
         self.activations += state == ACTIVE
         self._listener.on_transition_end(
-            TransitionOutcome(transition, state, success=success, reason=reason)
+            TransitionOutcome(transition, state, success=not reason, reason=reason)
         )
 
     async def _until_ready(self, condition: Callable[[], bool], end_s: float) -> bool:

@@ -281,8 +281,8 @@ class SupervisionListener:
             Fault(self._name, kind, text, self._context.desired.value.serial)
         )
 
-    def on_ended(self, text: str, state: str, *, is_awaited: bool = False) -> None:
-        """Report that a node outside the process has ended by itself, and its new state.
+    def on_ended(self, text: str, *, is_awaited: bool = False) -> None:
+        """Report that a node outside the process has ended by itself, and is unconfigured now.
 
         With ``is_awaited``, it cannot be started from here, and its return will be reported. No
         plan moves the node until the supervisor has handled the fault.
@@ -290,8 +290,8 @@ class SupervisionListener:
         kind = FaultKind.ABSENT if is_awaited else FaultKind.ENDED
         fault = Fault(self._name, kind, text, self._context.desired.value.serial)
         self._context.desired.update(lambda desired: desired.await_fault(fault))
+        self._last_state = state = PrimaryState.UNCONFIGURED.value
         self._context.status.set_state(self._name, state)
-        self._last_state = state
         self._context.reporter.report(events.StateChanged, self._full_name, "end", state)
         self._context.main_queue.put(fault)
 

@@ -124,9 +124,7 @@ class NodeSet:
         A node of another process may have to wait for nodes of the same one, ``after``.
         """
         node = self.nodes[name]
-        if isinstance(node, MemberNode):
-            return node.loop.run_task(node.run_step_after(after, transition, is_outdated))
-        return node.loop.run_task(node.lifecycle.run_step(transition, is_outdated))
+        return node.loop.run_task(node.lifecycle.run_step(transition, is_outdated, after))
 
     def take_over(self) -> None:
         """Use the nodes of other processes in the states in which they are."""
@@ -238,9 +236,6 @@ def _take_over(members: Sequence[MemberNode]) -> None:
 
 
 def _summary(node: ManagedNode) -> NodeSummary:
-    if isinstance(node, MemberNode):
-        counts = {name: node.counts.get(name, 0) for name in COUNTERS}
-        return NodeSummary(node.full_name, node.state, is_counted=True, **counts)
-    counts = {name: getattr(node.statistics, name) for name in COUNTERS}
-    is_counted = node.model.in_process
+    counts = {name: node.count(name) for name in COUNTERS}
+    is_counted = node.model.in_process or isinstance(node, MemberNode)
     return NodeSummary(node.full_name, node.state, is_counted=is_counted, **counts)
