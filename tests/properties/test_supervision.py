@@ -137,7 +137,7 @@ class Supervision(RuleBasedStateMachine):
         if self.external.state in ("inactive", "active"):
             self.external.state = "unconfigured"
             self.world.allow(EXTERNAL)
-            self.listener.on_ended("it has disappeared", "unconfigured", is_awaited=True)
+            self.listener.on_ended("it has disappeared", is_awaited=True)
 
     @precondition(lambda self: self.external.is_absent)
     @rule(is_late=st.booleans())
