@@ -216,7 +216,9 @@ class AdoptedNode(Node):
 
     def remove_waitable(self, waitable: Waitable) -> None:
         """Remove an action, which its own ``destroy`` does."""
-        self._composer_instance.entities.pop(waitable)
+        port = self._composer_instance.pop(waitable)
+        if isinstance(port, HostedActionServer):
+            port.withdraw()
         self._composer_instance.context.loop.remove(waitable)
         super().remove_waitable(waitable)
 

@@ -165,9 +165,7 @@ class HostedNode(LocalNode):
         self._entities = PortSet()
         if instance is None:
             return
-        instance.ended.set()  # threads that spin the node return
-        for executor in instance.executors:
-            executor.shutdown(0.0)
+        instance.end()
         for service in instance.lasting_services:
             self.loop.remove(service)
             self._context.router.withdraw(service)
@@ -225,7 +223,7 @@ class HostedNode(LocalNode):
         """Call code of the class on a thread of its own, which may block within the time limit."""
         call = ThreadedCall(instance, function, f"{self.full_name} {name}")
         slow = self.loop.call_later(_BLOCKS_AFTER_S, partial(self._report_slow, call, name))
-        instance.in_transition, instance.transition_thread = True, call.thread
+        instance.transition_thread = call.thread
         try:
             await call.result()
         except Cancelled:
@@ -234,7 +232,7 @@ class HostedNode(LocalNode):
             raise
         finally:
             slow.cancel()
-            instance.in_transition, instance.transition_thread = False, None
+            instance.transition_thread = None
 
     def _report_slow(self, call: ThreadedCall, name: str) -> None:
         at = call.find_location()
@@ -365,7 +363,5 @@ class NodeOfBehavior:
     def end(self) -> None:
         """Release the node: its handle is not valid any more."""
         self._parameters.update(changed_parameters(self.node, self._instance.declared))
-        self._instance.ended.set()
-        for executor in self._instance.executors:
-            executor.shutdown(0.0)
+        self._instance.end()
         self._shared.restore()

@@ -146,8 +146,6 @@ class Instance:
         self.entities = PortSet()
         #: The instance, once ``Node.__init__`` was called.
         self.node: Any = None
-        #: True while the constructor or a handler of a transition runs.
-        self.in_transition = False
         #: What the class calls when its process is interrupted or terminated, by signal.
         self.signal_handlers: dict[int, Any] = {}
         #: True while the constructor runs.
@@ -167,6 +165,11 @@ class Instance:
         self._contexts: dict[CallbackGroup, NodeContext] = {}
         #: The names of the timers that exist now: counters are kept by name.
         self.timer_names: set[str] = set()
+
+    @property
+    def in_transition(self) -> bool:
+        """Whether the constructor or a handler of a transition runs."""
+        return self.transition_thread is not None
 
     @property
     def contexts(self) -> tuple[NodeContext, ...]:
@@ -217,11 +220,24 @@ class Instance:
 
     def remove(self, entity: object) -> bool:
         """Destroy an entity with its port; return false if it has none."""
+        port = self.pop(entity)
+        if port is not None:
+            port.destroy()
+        return port is not None
+
+    def pop(self, entity: object) -> RunningPort | None:
+        """Remove and return the port of an entity, or None; the class may create it again."""
         port = self.entities.pop(entity)
-        if port is None:
-            return False
-        port.destroy()
-        return True
+        declared = getattr(port, "port", None)
+        if declared is not None:
+            self.ports.forget(declared)
+        return port
+
+    def end(self) -> None:
+        """Let threads that spin the node return, and release its executors."""
+        self.ended.set()
+        for executor in self.executors:
+            executor.shutdown(0.0)
 
     def spin(self, future: Awaited, timeout_s: float | None) -> None:
         """Wait as :meth:`wait_for`, for a function of rclpy that spins.

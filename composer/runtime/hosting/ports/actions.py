@@ -51,7 +51,8 @@ class HostedActionServer(RunningPort):
         server.register_execute_callback(self._wrapped(self._execution, self._abort))
         self._tap = GoalTap(router.recorder, self.port, server, loop.clock)
         loop.add_action_server(server)
-        self._remove = router.add_action_server(self.port, self._local)
+        #: Ends the offer to clients of the process.
+        self.withdraw = router.add_action_server(self.port, self._local)
 
     def deactivate(self) -> None:
         """Ask the running goals to cancel."""
@@ -76,8 +77,7 @@ class HostedActionServer(RunningPort):
 
     def destroy(self) -> None:
         """Abort the goals that have not ended, and destroy the server."""
-        self._remove()
-        self._instance.ports.forget(self.port)
+        self.withdraw()
         for identity, goal in tuple(self._server._goal_handles.items()):
             if goal.is_active:
                 goal.abort()
@@ -198,7 +198,6 @@ class HostedActionClient(RunningPort):
 
     def destroy(self) -> None:
         """Destroy the client."""
-        self._instance.ports.forget(self.port)
         self._instance.context.loop.remove(self._client)
         self._client.destroy()
 

@@ -42,11 +42,6 @@ class HostedService(ServicePort):
             port = replace(port, reentrant=True)
         super().__init__(context, port, None, callback)
 
-    def destroy(self) -> None:
-        """Refuse the pending requests and destroy the service."""
-        self._instance.ports.forget(self.port)
-        super().destroy()
-
     def _interface(self, _port: Port) -> Any:
         return self._given.srv_type
 
@@ -197,7 +192,6 @@ class ClientPort(RunningPort):
 
     def destroy(self) -> None:
         """Fail the pending calls and destroy the client."""
-        self._instance.ports.forget(self.port)
         self.deactivate()
         self._instance.context.loop.remove(self._client)
         Node.destroy_client(self._instance.node, self._client)

@@ -57,11 +57,6 @@ class HostedPublisher(PublisherPort):
         for message in self._held.take():
             self.gated.publish(message)
 
-    def destroy(self) -> None:
-        """Destroy the publisher."""
-        self._instance.ports.forget(self.port)
-        super().destroy()
-
     def _publish_function(self) -> Callable[[Any], None]:
         publish = self.gated.publish
         if self.port.qos.profile.durability is Durability.TRANSIENT_LOCAL:
@@ -122,11 +117,6 @@ class HostedSubscription(SubscriptionPort):
         if is_reentrant(context):
             port = replace(port, reentrant=True)
         super().__init__(context, port, None, handler)
-
-    def destroy(self) -> None:
-        """Destroy the subscription."""
-        self._instance.ports.forget(self.port)
-        super().destroy()
 
     def _make_qos_events(self, port: Port) -> QosEvents:
         return HostedQosEvents(self._context, port, self._callbacks)
