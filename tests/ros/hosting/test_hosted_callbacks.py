@@ -163,6 +163,30 @@ def test_goals_are_executed_while_the_node_is_active_and_canceled_when_it_is_not
         client.destroy()
 
 
+def test_a_class_may_destroy_its_action_server_and_create_it_again(tmp_path: Path) -> None:
+    text = f"""
+    system: goals
+    nodes:
+      navigator:
+        class: {OTHERS}:Navigator
+        action_servers: {{navigate: {{type: composer_interfaces/action/Navigate}}}}
+      sender:
+        class: {OTHERS}:Sender
+        action_clients: {{navigate: {{type: composer_interfaces/action/Navigate}}}}
+    """
+    with running(text, tmp_path) as system:
+        navigator, sender = (system.node(name).instance for name in ("navigator", "sender"))
+        wait_until(lambda: sender.statuses)
+        loop = system.node("navigator").loop
+        loop.run(navigator.server.destroy)
+        wait_until(lambda: not sender.client.server_is_ready())
+        loop.run(navigator.serve)
+        sender.timer.reset()
+        wait_until(lambda: len(sender.statuses) == 2)
+        assert sender.statuses == [GoalStatus.STATUS_SUCCEEDED] * 2
+        assert not [line for line in system.log() if "is not declared" in line]
+
+
 def test_timers_of_a_class_follow_simulated_time(tmp_path: Path, peer: Peer) -> None:
     text = f"""
     system: simulated

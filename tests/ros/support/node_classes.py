@@ -195,6 +195,9 @@ class Navigator(Node):
     def __init__(self) -> None:
         super().__init__("navigator")
         self.canceled = 0
+        self.serve()
+
+    def serve(self) -> None:
         self.server = ActionServer(
             self,
             Navigate,
