@@ -36,7 +36,8 @@ class OtherProcesses:
         self._command = command
         self._write_log = write_log
         self._together = together
-        self._goals = KeptGoals(system, goals_path(namespace) if self._models else None)
+        #: The goals of the system, for the next coordinating process.
+        self.goals = KeptGoals(system, goals_path(namespace) if self._models else None)
         self._processes: dict[str, MemberProcess] = {}
 
     def process(self, name: str, context: OutsideContext) -> MemberProcess:
@@ -97,25 +98,13 @@ class OtherProcesses:
         """The last reports of the processes."""
         return tuple(item for process in self._all if (item := process.last_report) is not None)
 
-    # --- the goals of the system
-
     def found_goals(self) -> tuple[Mapping[str, PrimaryState], str] | None:
         """Return what an earlier coordinating process has left, by the keys of nodes.
 
         None if it has left no nodes inactive or active: then the system is to be started.
         """
         has_kept_nodes = any(process.has_kept_nodes for process in self._all)
-        return self._goals.read() if has_kept_nodes else None
-
-    def keep_goals(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
-        """Keep the goals of the system, by the keys of its nodes, and its activity."""
-        if self._processes:
-            self._goals.keep(goals, activity)
-
-    def forget_goals(self) -> None:
-        """Let the next coordinating process start the system as if it were the first one."""
-        if self._processes:
-            self._goals.forget()
+        return self.goals.read() if has_kept_nodes else None
 
     @property
     def _all(self) -> tuple[MemberProcess, ...]:

@@ -163,10 +163,6 @@ class NodeSet:
         threads = self.nodes[name].loop.busy_threads()
         return [innermost for innermost, *_ in running_callbacks(threads)]
 
-    def active(self) -> int:
-        """Return the number of active nodes."""
-        return sum(node.state == PrimaryState.ACTIVE.value for node in self.nodes.values())
-
     def recreate(self, name: str, is_outdated: Callable[[], bool]) -> str | None:
         """Replace a finalized node by a new one: no transition leaves *finalized*.
 

@@ -185,7 +185,7 @@ class Reconciler:
         words = conditions(self.context.system, desired, self.context.node_set.states(), moving)
         self.context.status.set_desired(states, desired.down, words)
         if desired.goals:  # the bring-up is over
-            self.context.node_set.other_processes.keep_goals(desired.goals, desired.activity)
+            self.context.node_set.other_processes.goals.keep(desired.goals, desired.activity)
 
     def _report_failed_step(self, failure: StepFailed) -> None:
         step = failure.step

@@ -61,10 +61,9 @@ class SystemStart:
             self._take_over(*found)
         if problem is None and not self.context.main_queue.stopping:
             status = self.context.status.snapshot()
-            active, nodes = self.context.node_set.active(), len(self.context.node_set.nodes)
             missing = status.missing_nodes(reasons=False)
             is_complete = not status.failed
-            details = active, nodes, status.remarks, is_complete, missing
+            details = status.active, len(status.nodes), status.remarks, is_complete, missing
             self.context.reporter.report(BroughtUp, *details)
         return problem
 
@@ -150,7 +149,7 @@ class SystemEnd:
         stop_within_s = self._options.stop_within_s
         self._end_s = self._context.clock.monotonic() + stop_within_s
         self._context.node_set.run_state.end_s = self._end_s
-        self._context.node_set.other_processes.forget_goals()
+        self._context.node_set.other_processes.goals.forget()
         if is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._end_s, limit_s):
