@@ -19,6 +19,7 @@ from composer.model.lifecycle import FINALIZED
 from composer.plan import Fault
 from composer.runtime.clock import COMPUTER
 from composer.runtime.executors.futures import Future
+from composer.runtime.members.kept_goals import KeptGoals
 from composer.runtime.node.managed_node import TransitionOutcome
 from composer.runtime.supervision.main_queue import (
     Item,
@@ -205,8 +206,8 @@ class NoOtherProcesses:
     def requests_together(self) -> AbstractContextManager[None]:
         return nullcontext()
 
-    def keep_goals(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
-        pass
+    def __init__(self) -> None:
+        self.goals = KeptGoals(SYSTEM, None)
 
 
 class World:
