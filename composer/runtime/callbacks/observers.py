@@ -77,8 +77,7 @@ class Hop:
 class NodeChains:
     """The hops of one node: by its publisher, and by the topic that it receives."""
 
-    node: str
-    hops: tuple[tuple[str, str, Hop], ...] = ()
+    hops: tuple[tuple[str, str, Hop], ...]
 
     def published_by(self, port: Port) -> tuple[Hop, ...]:
         """Return the hops that note what a publisher sends."""
@@ -109,8 +108,7 @@ class Chains:
 
     def of(self, node: Node) -> NodeChains:
         """Return the hops of a node."""
-        name = node.name.value
-        return NodeChains(name, tuple(self._hops.get(name, ())))
+        return NodeChains(tuple(self._hops.get(node.name.value, ())))
 
 
 T = TypeVar("T")

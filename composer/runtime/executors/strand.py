@@ -137,17 +137,12 @@ def in_steps(
     return OuterCoroutine(_steps(scope, coroutine, on_end), coroutine)
 
 
-def as_a_whole(scope: StepScope, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
-    """Return a coroutine that runs ``coroutine`` in scope from its start to its end."""
-    return OuterCoroutine(_whole(scope, coroutine), coroutine)
-
-
 class ExclusiveStrand(SerialStrand):
     """A strand on which a callback that awaits keeps the others waiting."""
 
     def wrap(self, coroutine: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
         """Return a coroutine that holds the strand until it has ended."""
-        return as_a_whole(self, coroutine)
+        return OuterCoroutine(_whole(self, coroutine), coroutine)
 
 
 class OuterCoroutine(Coroutine[Any, Any, T]):
