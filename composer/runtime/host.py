@@ -52,7 +52,7 @@ from composer.runtime.node.options import ProcessContext
 from composer.runtime.process import start_refused
 from composer.runtime.process.computer import (
     memory_excess,
-    place_process,
+    place_threads,
     switch_threads_sooner,
 )
 from composer.runtime.process.instance_lock import already_running, hold_instance_lock
@@ -162,7 +162,7 @@ class Host:
         if ends_process:  # the process is not that of a program that runs a system
             switch_threads_sooner()
         if self._options.process is not None:
-            self._node_set.warnings += place_process(self._options.process)
+            self._node_set.warnings += place_threads(self._options.process)
         queue = self._main_queue
         wait = partial(queue.wait, lambda: queue.stopping, stoppable=True)
         servers = discovery_servers(discovery, os.environ, self._reporter.log, wait)

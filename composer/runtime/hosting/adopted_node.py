@@ -31,7 +31,7 @@ from composer.runtime.hosting.ports.qos_events import PendingQosEvents
 from composer.runtime.hosting.ports.services import ClientPort, HostedService
 from composer.runtime.hosting.ports.timers import HostedGuardCondition, HostedRate, HostedTimerPort
 from composer.runtime.hosting.ports.topics import FirstMessage, HostedPublisher, HostedSubscription
-from composer.runtime.node.parameter_services import LoggerServices
+from composer.runtime.node.parameter_services import provide_logger_services
 from composer.runtime.ros.messages import load_type_support
 
 T = TypeVar("T")
@@ -92,7 +92,7 @@ class AdoptedNode(Node):
         instance = self._composer_instance
         context = instance.context
         before = len(lasting._services)
-        LoggerServices(lasting, context.loop.clock, context.log.warn)
+        provide_logger_services(lasting, context.loop.clock, context.log.warn)
         for service in lasting._services[before:]:
             context.serve(service, rclpy_callback(service, context.loop.run_task))
             instance.lasting_services.append(service)

@@ -5,12 +5,12 @@ See :mod:`composer.runtime.process.query_socket`, on whose thread the answers ar
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
 from composer.runtime.clock import COMPUTER
+from composer.runtime.executors.futures import done_event
 from composer.runtime.executors.loop import Loop
 from composer.runtime.manager.publishing import ReportPublisher
 from composer.runtime.middleware.local_resources import count_participants
@@ -211,10 +211,8 @@ class ManagerQueries:
         Other nodes are left out, also nodes of other processes, which have parameter services
         of their own.
         """
-        done = threading.Event()
         future = self._loop.run_task(self._collect(query.nodes))
-        future.add_done_callback(lambda _: done.set())
-        if not self._loop.clock.wait(done, _PARAMETERS_WITHIN_S):
+        if not self._loop.clock.wait(done_event(future), _PARAMETERS_WITHIN_S):
             future.cancel()
             return None
         return future.result()

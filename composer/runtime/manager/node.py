@@ -29,7 +29,7 @@ from composer.runtime.manager.other_instances import OtherInstances
 from composer.runtime.manager.publishing import ManagerContext, ReportPublisher
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.options import ProcessContext
-from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
+from composer.runtime.node.parameter_services import ParameterServices, provide_logger_services
 from composer.runtime.node_time import NodeTime, SimTimeSource, publish_clock
 from composer.runtime.process.query_socket import QuerySocket
 from composer.runtime.protocol.codec import ProtocolError
@@ -95,7 +95,7 @@ class ManagerNode:
         self._log = Log(self._node, context.write_log)
         self._own_parameters = ParameterServices(self._node, status.clock, self._log.warn)
         self._own_parameters.provide()
-        LoggerServices(self._node, status.clock, self._log.warn)
+        provide_logger_services(self._node, status.clock, self._log.warn)
         self._loop.add_node(self._node)
         simulated_time = SimTimeSource(self._node, self._loop, self._log.warn)
         self.process_context = ProcessContext(

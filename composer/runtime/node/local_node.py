@@ -27,7 +27,7 @@ from composer.runtime.intra_process.lifecycle_gate import LifecycleGate, Pending
 from composer.runtime.node.lifecycle import Lifecycle
 from composer.runtime.node.managed_node import ManagedNode, TransitionOutcome
 from composer.runtime.node.options import NodeOptions, make_ros_node, record_parameter_events
-from composer.runtime.node.parameter_services import LoggerServices, ParameterServices
+from composer.runtime.node.parameter_services import ParameterServices, provide_logger_services
 from composer.runtime.node_time import NodeTime
 from composer.runtime.ports import PortSet, deactivate, settle
 
@@ -100,7 +100,7 @@ class LocalNode(ManagedNode):
         if offers.parameters:
             self.parameter_services.provide()
         if offers.logger_services:
-            LoggerServices(self._ros, self.loop.clock, self._context.log.warn)
+            provide_logger_services(self._ros, self.loop.clock, self._context.log.warn)
         self.loop.add_node(self._ros)
         for service in self._ros.services:
             answer = rclpy_callback(service, self.loop.run_task)

@@ -222,26 +222,25 @@ def _refusal(reason: str) -> SetParametersResult:
 _TYPES = frozenset(kind.value for kind in Parameter.Type)
 
 
-class LoggerServices:
-    """The two services of one node. Create it before the node is added to its loop."""
+def provide_logger_services(node: Node, clock: Clock, warn: Callable[[str], None]) -> None:
+    """Create the two services of one node. Call it before the node is added to its loop.
 
-    def __init__(self, node: Node, clock: Clock, warn: Callable[[str], None]) -> None:
-        """``warn`` logs requests that are refused."""
-        self._warn = warn
-        self._repeats = RepeatLimit(clock)
-        self._add(node, GetLoggerLevels, "get_logger_levels", _get)
-        self._add(node, SetLoggerLevels, "set_logger_levels", _set)
+    ``warn`` logs requests that are refused.
+    """
+    repeats = RepeatLimit(clock)
 
-    def _add(self, node: Node, kind: Any, name: str, answer: Callable[[Any, Any], None]) -> None:
+    def add(kind: Any, name: str, answer: Callable[[Any, Any], None]) -> None:
         def respond(request: Any, response: Any) -> Any:
             if isinstance(request, TooLarge):
-                text = f"refused a request of '{name}': {request.reason}"
-                self._repeats.warn(self._warn, name, text)
+                repeats.warn(warn, name, f"refused a request of '{name}': {request.reason}")
             else:
                 answer(request, response)
             return response
 
         node.create_service(limited(kind), f"~/{name}", respond)
+
+    add(GetLoggerLevels, "get_logger_levels", _get)
+    add(SetLoggerLevels, "set_logger_levels", _set)
 
 
 def _get(request: Any, response: Any) -> None:

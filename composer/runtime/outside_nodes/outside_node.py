@@ -103,10 +103,6 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         """Whether it is not there, and something else has to start it."""
         return self._is_lost
 
-    def now_s(self) -> float:
-        """Return the system time in seconds."""
-        return self.loop.clock.time()
-
     @abstractmethod
     def destroy(self) -> None:
         """End the process of the node, if it has one, without waiting for that."""

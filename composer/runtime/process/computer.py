@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from enum import Enum
 
 from composer.base.fast_dataclass import dataclass
-from composer.model import Executor, ExecutorKind, Process
+from composer.model import Executor, Process
 from composer.runtime.clock import COMPUTER
 
 _REFUSED_WITHIN_S = 0.3
@@ -165,21 +165,6 @@ def switch_threads_sooner() -> None:
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL_S))
 
 
-def place_process(process: Process) -> tuple[str, ...]:
-    """Apply the CPUs and the priority to this thread, and so to all that it starts.
-
-    Returns a message for each request that Linux refuses.
-    """
-    settings = Executor(
-        process.name,
-        ExecutorKind.EVENTS,
-        process.span,
-        cpus=process.cpus,
-        priority=process.priority,
-    )
-    return place_threads(settings, (0,))
-
-
 def memory_excess(process: Process) -> str | None:
     """Return why this process uses too much memory, or None."""
     limit = process.memory_mb
@@ -192,38 +177,41 @@ def memory_excess(process: Process) -> str | None:
     return f"{used}, more than {limit.value:g} MB"
 
 
-def place_threads(executor: Executor, native_thread_ids: Iterable[int]) -> tuple[str, ...]:
-    """Apply the executor's CPUs and priority to threads of this process, by their Linux ids.
+def place_threads(
+    settings: Executor | Process, native_thread_ids: Iterable[int] = (0,)
+) -> tuple[str, ...]:
+    """Apply CPUs and a priority to threads of this process, by their Linux ids.
 
-    Returns a message for each request that Linux refuses; the threads run nevertheless.
+    By default, to the calling thread, and so to all that it starts. Returns a message for each
+    request that Linux refuses; the threads run nevertheless.
     """
     ids = tuple(native_thread_ids)
-    return tuple(dict.fromkeys((*_set_cpus(executor, ids), *_set_priority(executor, ids))))
+    return tuple(dict.fromkeys((*_set_cpus(settings, ids), *_set_priority(settings, ids))))
 
 
-def _set_cpus(executor: Executor, native_thread_ids: Iterable[int]) -> Iterator[str]:
-    if not executor.cpus:
+def _set_cpus(settings: Executor | Process, native_thread_ids: Iterable[int]) -> Iterator[str]:
+    if not settings.cpus:
         return
     for thread_id in native_thread_ids:
         try:
-            os.sched_setaffinity(thread_id, executor.cpus)
+            os.sched_setaffinity(thread_id, settings.cpus)
         except OSError as error:
             allowed = ", ".join(map(str, sorted(os.sched_getaffinity(0))))
-            desired = ", ".join(map(str, executor.cpus))
+            desired = ", ".join(map(str, settings.cpus))
             yield (
-                f"executor '{executor.name}' cannot run on CPU {desired}: {error.strerror};"
+                f"executor '{settings.name}' cannot run on CPU {desired}: {error.strerror};"
                 f" this process may use {allowed}"
             )
 
 
-def _set_priority(executor: Executor, native_thread_ids: Iterable[int]) -> Iterator[str]:
-    if executor.priority is None:
+def _set_priority(settings: Executor | Process, native_thread_ids: Iterable[int]) -> Iterator[str]:
+    if settings.priority is None:
         return
     for thread_id in native_thread_ids:
         try:
-            os.sched_setscheduler(thread_id, os.SCHED_FIFO, os.sched_param(executor.priority))
+            os.sched_setscheduler(thread_id, os.SCHED_FIFO, os.sched_param(settings.priority))
         except OSError as error:
             yield (
-                f"executor '{executor.name}' cannot have real-time priority {executor.priority}:"
+                f"executor '{settings.name}' cannot have real-time priority {settings.priority}:"
                 f" {error.strerror}; {_PRIORITY_HINT}"
             )
