@@ -6,6 +6,7 @@ See design.ros2.org/articles/node_lifecycle.html. Ids are as in lifecycle_msgs/m
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import itemgetter
 from typing import NamedTuple
 
 UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = "unconfigured", "inactive", "active", "finalized"
@@ -32,8 +33,9 @@ TRANSITIONS: Mapping[str, Transition] = {
 
 
 def available_transitions(state: str) -> dict[str, int]:
-    """Return the ids of the transitions that start in a state, by name."""
-    return {name: item.ids[state] for name, item in TRANSITIONS.items() if state in item.ids}
+    """Return the ids of the transitions that start in a state, by name, in the order of rcl."""
+    found = {name: item.ids[state] for name, item in TRANSITIONS.items() if state in item.ids}
+    return dict(sorted(found.items(), key=itemgetter(1)))
 
 
 def next_transition(state: str, goal: str) -> str | None:

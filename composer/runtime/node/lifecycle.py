@@ -42,7 +42,6 @@ from composer.runtime.ros.service_requests import TooLarge, limited
 if TYPE_CHECKING:
     from composer.runtime.node.local_node import LocalNode
 
-_NAMES = {number: name for name, item in TRANSITIONS.items() for number in item.ids.values()}
 _Work: TypeAlias = Callable[[], Coroutine[Any, Any, None]]
 _LABEL_LENGTH = 80
 _SUCCESS, _FAILURE, _ERROR = "transition_success", "transition_failure", "transition_error"
@@ -112,20 +111,6 @@ class Lifecycle(ManagedLifecycle):
                 return str(self._machine.current_state[1])
         except InvalidHandle:
             return self._last_state
-
-    @property
-    def available(self) -> Mapping[str, int]:
-        """The ids of the transitions that can be requested now, by name."""
-        try:
-            with self._machine:
-                transitions = self._machine.available_transitions
-        except InvalidHandle:
-            return {}
-        return {
-            _NAMES[transition_id]: transition_id
-            for transition_id, *_ in transitions
-            if transition_id in _NAMES
-        }
 
     def fail_request(self) -> None:
         """Answer the pending ``change_state`` request: its transition hangs. Thread-safe."""
@@ -254,7 +239,7 @@ class Lifecycle(ManagedLifecycle):
         name = transition[:_LABEL_LENGTH]  # the label of a request may be any text
         name = name if name.isprintable() else ascii(name)[1:-1]
         reason = f"refused '{name}': {why}; available transitions: {available}"
-        self._warn(transition if transition in _NAMES.values() else "", reason)
+        self._warn(transition if transition in TRANSITIONS else "", reason)
         return TransitionOutcome(transition, self.state, success=False, reason=reason)
 
     def _warn(self, subject: str, text: str) -> None:
@@ -308,10 +293,8 @@ def _requested(request: ChangeState.Request, available: Mapping[str, int]) -> st
     """
     if request.transition.label:
         return str(request.transition.label)
-    name = _NAMES.get(request.transition.id)
-    if name is not None and available.get(name) == request.transition.id:
-        return name
-    return _label(request)
+    names = {number: name for name, number in available.items()}
+    return names.get(request.transition.id) or _label(request)
 
 
 def _label(request: ChangeState.Request) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.base.fast_dataclass import dataclass
 from composer.model import LogLevel, Node
+from composer.model.lifecycle import available_transitions
 from composer.plan import FaultKind
 from composer.runtime.executors.futures import Future
 from composer.runtime.metrics.statistics import Statistics
@@ -136,9 +137,9 @@ class ManagedLifecycle(ABC):
         """The label of the lifecycle state. Thread-safe."""
 
     @property
-    @abstractmethod
     def available(self) -> Mapping[str, int]:
         """The ids of the transitions that can be requested now, by name. Thread-safe."""
+        return available_transitions(self.state)
 
     async def change(self, transition: str) -> TransitionOutcome:
         """Run a requested ``transition`` as soon as no other one runs."""

@@ -16,7 +16,6 @@ from composer.model.lifecycle import (
     INACTIVE,
     TRANSITIONS,
     UNCONFIGURED,
-    available_transitions,
     last_transition,
 )
 from composer.model.names import split_node_name
@@ -108,11 +107,6 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         """End the process of the node, if it has one, without waiting for that."""
 
     # --- the lifecycle
-
-    @property
-    def available(self) -> Mapping[str, int]:
-        """The ids of the transitions that can be requested now, by name."""
-        return available_transitions(self._state)
 
     async def _run(self, transition: str, *, requested: bool) -> TransitionOutcome:
         """Run a transition; the lock has been acquired, and is released at the end."""
