@@ -64,11 +64,11 @@ class NodeListener(Protocol):
 class RunState:
     """What all nodes of a system follow of its run. Any thread may read and set it.
 
-    ``is_up`` is set after the bring-up: errors count as faults from then on, as some nodes have
-    waited for others before. ``end_s`` (monotonic) is set while the system shuts down: nothing may
-    last longer. With ``leaves_others``, nodes that were not started here keep their states, because
-    another system uses them. With ``keeps_entities``, ports are destroyed by the end of the process
-    only.
+    ``is_up`` is set after the bring-up: silence and errors count as faults from then on, as some
+    nodes have waited for others before. ``end_s`` (monotonic) is set while the system shuts down:
+    nothing may last longer. With ``leaves_others``, nodes that were not started here keep their
+    states, because another system uses them. With ``keeps_entities``, ports are destroyed by the
+    end of the process only.
     """
 
     is_up: bool = False

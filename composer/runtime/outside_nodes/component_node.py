@@ -20,11 +20,11 @@ from composer.runtime.executors.tasks import wait_for
 from composer.runtime.node.parameters import parameter_message
 from composer.runtime.outside_nodes.outside_node import (
     PERIOD_S,
+    ObservedNode,
     OutsideContext,
-    OutsideNode,
     TransitionRefused,
 )
-from composer.runtime.outside_nodes.remote_node import NodePresence, NotAnswered, RemoteServices
+from composer.runtime.outside_nodes.remote_node import NotAnswered, RemoteServices
 from composer.runtime.outside_nodes.started_node import Ended, StartedNode
 from composer.runtime.ros.messages import MessageError, interface_class
 
@@ -70,10 +70,10 @@ class ComponentNode(StartedNode["LoadedComponent"]):
             self._started = None
 
     @property
-    def _container(self) -> OutsideNode:
+    def _container(self) -> ObservedNode:
         name = self.model.container
         node = None if name is None else self._nodes.get(name.value)
-        if not isinstance(node, OutsideNode):
+        if not isinstance(node, ObservedNode):
             raise TransitionRefused("it has no container", UNCONFIGURED)
         return node
 
@@ -92,7 +92,7 @@ class ComponentNode(StartedNode["LoadedComponent"]):
             self._is_lost = True
             text = f"its container {container.full_name} is {container.state}"
             raise TransitionRefused(text, state)
-        self.earlier = container.earlier
+        self.presence.earlier = container.presence.earlier
         run = LoadedComponent(self._manager, self.loop, container, self._on_container_end)
         end_s = self.loop.clock.monotonic() + self._component.ready_timeout_s
         try:
@@ -141,7 +141,7 @@ class ComponentNode(StartedNode["LoadedComponent"]):
                 await self._while_it_runs(run, self._unload(run, end_s))
                 if self._run_state.end_s is None:  # it may be loaded again
                     end_s = self.loop.clock.monotonic() + _GONE_WITHIN_S
-                    await self._until(lambda: not self._presence.has_node(self.earlier), end_s)
+                    await self._until(lambda: not self.presence.has_node(), end_s)
         except NotAnswered as error:
             raise TransitionRefused(f"cannot be unloaded: {error}", UNCONFIGURED) from error
         except Ended:
@@ -169,7 +169,7 @@ class ComponentNode(StartedNode["LoadedComponent"]):
             self._on_container_end(run, f"is {run.container.state}")
         elif run.is_restarted():
             self._on_container_end(run, "was started again")
-        elif not self._presence.has_node(self.earlier):
+        elif not self.presence.has_node():
             run.ended.set_result("it has disappeared from the ROS graph: something has unloaded it")
 
 
@@ -187,7 +187,7 @@ class LoadedComponent(RemoteServices):
         self,
         ros: RosNode,
         loop: Loop,
-        container: OutsideNode,
+        container: ObservedNode,
         on_container_end: Callable[[LoadedComponent, str], None],
     ) -> None:
         super().__init__(ros, loop, container.full_name)
@@ -195,7 +195,6 @@ class LoadedComponent(RemoteServices):
         self.unique_id = 0
         self.ended: Future[str] = Future()
         self.load_service = f"{container.full_name}/_container/load_node"
-        self._presence = NodePresence(ros, container.model)
         self._participants: frozenset[bytes] = frozenset()
         self._loading = self._client(_service("LoadNode"), "_container/load_node")
         self._unloading = self._client(_service("UnloadNode"), "_container/unload_node")
@@ -223,14 +222,12 @@ class LoadedComponent(RemoteServices):
 
     def is_ready(self) -> bool:
         """Return whether the container has its services."""
-        return all(client.service_is_ready() for client in self._clients) and (
-            self._presence.has_service(self.load_service, self.container.earlier)
-        )
+        are_ready = all(client.service_is_ready() for client in self._clients)
+        return are_ready and bool(self._servers())
 
     def is_restarted(self) -> bool:
         """Return whether another process than the one that has loaded it is the container now."""
-        now = self._presence.servers(self.load_service) - self.container.earlier
-        return not now <= self._participants
+        return not self._servers() <= self._participants
 
     async def ids(self, full_name: str, end_s: float) -> list[int]:
         """Return the ids of loaded nodes with a name. Raises NotAnswered."""
@@ -244,7 +241,7 @@ class LoadedComponent(RemoteServices):
         The request is sent once: a second one would load a second node. If there is no response,
         the container is asked for what it has loaded.
         """
-        self._participants = self._presence.servers(self.load_service) - self.container.earlier
+        self._participants = self._servers()
         future = self._loading.call_async(request)
         try:
             while True:
@@ -262,6 +259,9 @@ class LoadedComponent(RemoteServices):
                     raise LoadFailed(f"{self.container.full_name} cannot load it: {reason}")
         finally:
             self._loading.remove_pending_request(future)
+
+    def _servers(self) -> frozenset[bytes]:
+        return self.container.presence.servers(self.load_service)
 
     async def unload(self, unique_id: int, end_s: float) -> None:
         """Unload a node, which need not be loaded. Raises NotAnswered."""

@@ -85,10 +85,6 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
         self._is_lost = False
         #: Called if it ends by itself, before that is reported.
         self.followers: set[Callable[[], None]] = set()
-        #: Held while a container loads or unloads: of requests that wait, DDS keeps ten.
-        self.loading = TransitionLock()
-        #: The participants of its earlier processes, which DDS shows for a while.
-        self.earlier: frozenset[bytes] = frozenset()
 
     # --- the managed node
 
@@ -101,10 +97,6 @@ class OutsideNode(ManagedNode, ManagedLifecycle):
     def is_absent(self) -> bool:
         """Whether it is not there, and something else has to start it."""
         return self._is_lost
-
-    @abstractmethod
-    def destroy(self) -> None:
-        """End the process of the node, if it has one, without waiting for that."""
 
     # --- the lifecycle
 
@@ -199,20 +191,22 @@ class ObservedNode(OutsideNode):
         super().__init__(model, context)
         self._outside = outside
         self._manager = context.manager
-        self._presence = NodePresence(self._manager, model)
+        self.presence = NodePresence(self._manager, model)
+        #: Held while a container loads or unloads: of requests that wait, DDS keeps ten.
+        self.loading = TransitionLock()
         self._remote: RemoteLifecycle | None = None
 
     def _is_there(self) -> bool:
         """Return whether it can be used: with its service if it is managed, or all its ports."""
         if self._outside.is_managed:
-            return self._presence.has_service(self._service, self.earlier)
-        return self._presence.has_node(self.earlier) and not self._presence.missing(self.earlier)
+            return bool(self.presence.servers(self._service))
+        return self.presence.has_node() and not self.presence.missing()
 
     def _missing(self) -> str:
         """Return what it does not have yet, in words; without ports, the node is missing."""
         if self._outside.is_managed:
             return f"it has no service {self._service}"
-        names = [f"{port.kind} {port.full_name}" for port in self._presence.missing(self.earlier)]
+        names = [f"{port.kind} {port.full_name}" for port in self.presence.missing()]
         if not names:
             return "it is not in the ROS graph"
         return f"it has no {shortened(names, _MAX_MISSING)}"
@@ -280,7 +274,7 @@ class ExternalNode(ObservedNode):
         limit_s = self._outside.ready_timeout_s
         if not await self._until_ready(self._is_there, self.loop.clock.monotonic() + limit_s):
             self._is_lost = True
-            elsewhere = elsewhere_text(self.model, self._presence.names_elsewhere())
+            elsewhere = elsewhere_text(self.model, self.presence.names_elsewhere())
             advice = elsewhere or "; start it, or see 'ros2 node list'"
             raise TransitionRefused(f"{self._missing()} after {limit_s:g} s{advice}", state)
         self._is_lost = False
@@ -309,7 +303,7 @@ class ExternalNode(ObservedNode):
         if self._lock.is_held or self.state not in (UNCONFIGURED, INACTIVE, ACTIVE):
             return
         is_used = self.state == ACTIVE or self._remote is not None
-        if is_used and not self._presence.has_node(self.earlier):
+        if is_used and not self.presence.has_node():
             self._is_lost = True
             self._close_remote()
             self._fail("it has disappeared from the ROS graph", is_awaited=True)

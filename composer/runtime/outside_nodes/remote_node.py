@@ -31,7 +31,8 @@ class NodePresence:
     """The endpoints of one node, as the manager node has discovered them.
 
     DDS shows a killed process for 20 s more. An endpoint has the prefix of its participant, so the
-    endpoints of an earlier process can be ignored: those of :meth:`participants` at its start.
+    endpoints of an earlier process can be ignored: those of :meth:`participants` at its start are
+    ``earlier``.
     """
 
     def __init__(self, manager: RosNode, model: Node) -> None:
@@ -42,6 +43,7 @@ class NodePresence:
         program = model.executable
         #: False: any node may be one of its program.
         self._are_known = not (model.keeps_names and program is not None and not program.nodes)
+        self.earlier: frozenset[bytes] = frozenset()
 
     def participants(self) -> frozenset[bytes]:
         """Return the prefixes of the participants with this node, as far as they are known."""
@@ -50,18 +52,18 @@ class NodePresence:
             found += self._endpoints(port)
         return frozenset(map(participant, self._own(found)))
 
-    def has_node(self, earlier: frozenset[bytes]) -> bool:
-        """Return whether the node is in the graph, and not only as part of ``earlier``."""
-        if not self._are_known or self.participants() - earlier:
+    def has_node(self) -> bool:
+        """Return whether the node is in the graph, and not only as part of an earlier process."""
+        if not self._are_known or self.participants() - self.earlier:
             return True
-        return not earlier and not self._names.isdisjoint(RosGraph(self._manager).nodes())
+        return not self.earlier and not self._names.isdisjoint(RosGraph(self._manager).nodes())
 
-    def namesakes(self, earlier: frozenset[bytes]) -> int:
+    def namesakes(self) -> int:
         """Return how many nodes its process has created with its name, in any namespace."""
         events = self._manager.get_publishers_info_by_topic(_PARAMETER_EVENTS)
         name = self._model.ros_name.value
         counts = Counter(participant(event) for event in events if event.node_name == name)
-        return max((counts[item] for item in self.participants() - earlier), default=0)
+        return max((counts[item] for item in self.participants() - self.earlier), default=0)
 
     def names_in(self, pid: int) -> set[str]:
         """Return the full names of the nodes in a process and its children."""
@@ -77,23 +79,21 @@ class NodePresence:
         name = self._model.ros_name.value
         return {join_node_name(namespace, last) for last, namespace in nodes if last == name}
 
-    def missing(self, earlier: frozenset[bytes]) -> tuple[Port, ...]:
+    def missing(self) -> tuple[Port, ...]:
         """Return the declared ports that the node does not have yet."""
         return tuple(
             port
             for port in self._model.ports
             if all(
-                participant(endpoint) in earlier for endpoint in self._own(self._endpoints(port))
+                participant(endpoint) in self.earlier
+                for endpoint in self._own(self._endpoints(port))
             )
         )
 
-    def has_service(self, service: str, earlier: frozenset[bytes]) -> bool:
-        """Return whether the node provides a service, by its full name."""
-        return bool(self.servers(service) - earlier)
-
     def servers(self, service: str) -> frozenset[bytes]:
-        """Return the participants in which the node provides a service."""
-        return frozenset(map(participant, self._own(servers_of(self._manager, service))))
+        """Return the participants in which the node provides a service, by its full name."""
+        found = map(participant, self._own(servers_of(self._manager, service)))
+        return frozenset(found) - self.earlier
 
     def _common_endpoints(self) -> list[TopicEndpointInfo]:
         return [

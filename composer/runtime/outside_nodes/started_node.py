@@ -255,7 +255,7 @@ class ExecutableNode(StartedNode[Child]):
 
     def _not_ready(self, run: Child, missing: str) -> str:
         """Return why its process is not ready in time, with the nodes that it has instead."""
-        names = set() if run.pid is None else self._presence.names_in(run.pid)
+        names = set() if run.pid is None else self.presence.names_in(run.pid)
         return super()._not_ready(run, missing) + elsewhere_text(self.model, names)
 
     # --- the process
@@ -276,7 +276,7 @@ class ExecutableNode(StartedNode[Child]):
         if self._command is None:
             raise TransitionRefused("its program was not found", UNCONFIGURED)
         await self._end()
-        self.earlier = self._presence.participants()
+        self.presence.earlier = self.presence.participants()
         try:
             command = self._with_parameters(self._command)
             child = self._children.start(command, self._log)
@@ -300,7 +300,7 @@ class ExecutableNode(StartedNode[Child]):
         self.loop.call_later(_ALL_NODES_WITHIN_S, partial(self._check_names, run))
 
     def _check_names(self, child: Child) -> None:
-        count = self._presence.namesakes(self.earlier)
+        count = self.presence.namesakes()
         if child is self._started and not self.model.keeps_names and count > 1:
             self._listener.write_log(
                 LogLevel.WARN,
