@@ -123,7 +123,6 @@ class Host:
         )
         self._end = SystemEnd(down, self._supervisor, self._options)
         self._limits = TimeLimits(self._options)
-        self._failed = False
         self._is_created = False
         self._shutdown_commands: list[Command] = []
 
@@ -185,7 +184,7 @@ class Host:
                     gc.unfreeze()
                 if not self._end.has_left_graph:  # otherwise there is nothing left to shut down
                     try_shutdown()
-        return self._end.outcome(has_failed=self._failed)
+        return self._end.outcome()
 
     def _prepare_clock(self) -> None:
         """Prepare what the time of the run asks for. Raises StartRefused."""
@@ -317,7 +316,7 @@ class Host:
         self._reporter.log(LogLevel.WARN, PROGRAM_LOGGER, text)
 
     def _fail(self, reason: str) -> None:
-        self._failed = True
+        self._end.has_failed = True
         self._main_queue.request_stop(reason)
 
     # --- callbacks of the manager node, on its thread

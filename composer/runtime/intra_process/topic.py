@@ -18,6 +18,7 @@ from typing import Any, Protocol
 
 from rclpy.publisher import Publisher
 
+from composer.base.fast_dataclass import dataclass
 from composer.model import Isolation, Port
 from composer.model.qos import Durability, Liveliness, QosProfile, incompatibilities
 from composer.runtime.clock import Clock
@@ -147,24 +148,17 @@ class Leases:
             lease.close()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class LocalSubscription:
-    """A subscription, as publishers of its topic see it."""
+    """A subscription, as publishers of its topic see it.
 
-    __slots__ = ("isolated", "leases", "message_type", "profile", "receiver")
+    ``leases`` has the leases of its publishers, if the runtime monitors them.
+    """
 
-    def __init__(
-        self,
-        message_type: Any,
-        port: Port,
-        receiver: Receiver,
-        leases: Leases | None = None,
-    ) -> None:
-        """``leases`` has the leases of its publishers, if the runtime monitors them."""
-        self.message_type = message_type
-        self.profile = port.qos.profile
-        self.isolated = port.isolation is Isolation.COPY
-        self.receiver = receiver
-        self.leases = leases
+    message_type: Any
+    port: Port
+    receiver: Receiver
+    leases: Leases | None
 
 
 class CopyingTarget:
@@ -257,7 +251,7 @@ class LocalPublisher(GatedPublisher):
 
     def _matches(self, subscription: LocalSubscription) -> bool:
         has_type = subscription.message_type is self.message_type
-        return has_type and not incompatibilities(self.profile, subscription.profile)
+        return has_type and not incompatibilities(self.profile, subscription.port.qos.profile)
 
     def _set_subscriptions(self, subscriptions: tuple[LocalSubscription, ...]) -> None:
         self._subscriptions = subscriptions
@@ -268,7 +262,8 @@ class LocalPublisher(GatedPublisher):
         target: Target = subscription.receiver
         if subscription.leases is not None:
             target = subscription.leases.target(self, self.profile, target)
-        return CopyingTarget(target) if self._isolated or subscription.isolated else target
+        is_isolated = self._isolated or subscription.port.isolation is Isolation.COPY
+        return CopyingTarget(target) if is_isolated else target
 
     def _check_external(self) -> None:
         with self._checking:
@@ -309,7 +304,7 @@ class LatchingPublisher(LocalPublisher):
         if not self._matches(subscription):
             return
         with self._lock:
-            if subscription.profile.durability is Durability.TRANSIENT_LOCAL:
+            if subscription.port.qos.profile.durability is Durability.TRANSIENT_LOCAL:
                 for message in self._latched.messages():
                     self._target_of(subscription).put(message)
             self._set_subscriptions((*self._subscriptions, subscription))

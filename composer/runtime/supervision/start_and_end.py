@@ -124,7 +124,8 @@ class SystemEnd:
         self._remarks: tuple[str, ...] = ()
         self._end_s = math.inf
         self._is_left_to_exit = False  # only the end of the process removes all nodes
-        self._has_failed = False
+        #: Whether the run has failed, which it may have before its end.
+        self.has_failed = False
         #: Whether the end of the process removes the nodes faster than their destruction.
         self.uses_fast_exit = options.ends_process and len(self._context.system.nodes) > _FEW_NODES
         self.has_left_graph = False
@@ -138,7 +139,7 @@ class SystemEnd:
         """Lead the nodes down, if all of them were created."""
         if not self._context.main_queue.stopping:
             self._context.main_queue.request_stop("unrecoverable error")
-        self._has_failed = self._supervisor.has_failed_nodes
+        self.has_failed = self.has_failed or self._supervisor.has_failed_nodes
         self._context.status.set_activity("stopping")
         remarks = self._context.status.snapshot().remarks
         # The reason begins with the node that has ended the system, if one has.
@@ -153,10 +154,10 @@ class SystemEnd:
         if is_created:
             limit_s = _STEP_SHARE * stop_within_s
             if not self._supervisor.tear_down(self._down, self._end_s, limit_s):
-                self._has_failed = True
+                self.has_failed = True
         self._summary = self._context.node_set.summaries()
         if self._options.fail_on_error and any(node.errors for node in self._summary):
-            self._has_failed = True
+            self.has_failed = True
 
     def destroy(self, shutdown_commands: Iterable[Command]) -> None:
         """Answer the remaining commands and destroy the nodes, as far as there is time."""
@@ -165,14 +166,14 @@ class SystemEnd:
                 message = f"the system has stopped: {self._reason}"
                 item.answer(item.name == "shutdown", message)
             elif isinstance(item, Fault):
-                self._has_failed = True  # it was not handled
+                self.has_failed = True  # it was not handled
         self._context.status.set_activity("stopped")
         end_s = self._end_s
         if self._context.main_queue.urgent:
             end_s = min(end_s, self._context.clock.monotonic() + _URGENT_S)
         self._context.node_set.stop_loops(end_s)
         self._is_left_to_exit = not self._context.node_set.destroy(end_s)
-        self._has_failed = self._has_failed or self._context.node_set.has_unfinished()
+        self.has_failed = self.has_failed or self._context.node_set.has_unfinished()
 
     def leave_graph(self) -> bool:
         """Leave the ROS graph without destroying what is left of the nodes, if that is possible.
@@ -184,13 +185,13 @@ class SystemEnd:
             self.has_left_graph = leave_ros_graph()
         return self.has_left_graph
 
-    def outcome(self, *, has_failed: bool) -> Outcome:
-        """Return how the run went, which may have failed before its end."""
+    def outcome(self) -> Outcome:
+        """Return how the run went."""
         others = self._context.node_set.other_processes.last_reports
         of_others = (item for report in others for item in report.callbacks)
         chains = (item for report in others for item in report.chains)
         return Outcome(
-            exit_code=1 if has_failed or self._has_failed else 0,
+            exit_code=1 if self.has_failed else 0,
             reason=self._reason,
             elapsed_s=self._context.reporter.elapsed_s,
             nodes=self._summary,
