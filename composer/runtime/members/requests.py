@@ -158,6 +158,7 @@ class MemberRequests:
         self._send()
 
     def _send(self) -> None:
+        self._forget_canceled()
         while self._unsent and not self._holds and len(self._sent) < MAX_REQUESTS:
             if not self._is_ready():
                 self._wait_for_service()
@@ -212,22 +213,17 @@ class MemberRequests:
             self._is_discovered = is_found or self._clock.monotonic() >= self._awaited_until_s
         return self._is_discovered
 
-    def _forget(self, pending: Any) -> None:
-        """Wait no longer for the response to a request."""
-        if self._sent.pop(pending, None) is not None:
-            self._client.remove_pending_request(pending)
-            self._send()
-
     def _on_result(self, result: Future[StepResult]) -> None:
         if result.cancelled():
-            self._loop.call_soon(self._forget_canceled)
+            self._loop.call_soon(self._send)
 
     def _forget_canceled(self) -> None:
         """Forget steps that nothing waits for any more: their responses may have been lost."""
         self._unsent = [step for step in self._unsent if not step.result.done()]
         for pending, sent in tuple(self._sent.items()):
             if all(step.result.done() for step in sent):
-                self._forget(pending)
+                del self._sent[pending]
+                self._client.remove_pending_request(pending)
 
     def _on_key(self, pending: Any) -> None:
         if pending is self._key_request:
