@@ -32,7 +32,6 @@ from composer.runtime.clock import VirtualClock
 from composer.runtime.executors.base_loop import ScheduledCall, TimerQueue
 from composer.runtime.executors.loop import Loop
 from composer.runtime.executors.sources import Taken
-from composer.runtime.executors.tasks import TimerHandle
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 NANOSECONDS = 1_000_000_000
@@ -238,7 +237,7 @@ class NodeTime:
         call.start()
         return call
 
-    def call_every(self, period_s: float, callback: Callable[[], object]) -> TimerHandle:
+    def call_every(self, period_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` on the node's loop each ``period_s`` seconds.
 
         It uses the node's current time: the caller schedules it again after a switch. Raises
@@ -255,7 +254,7 @@ class NodeTime:
         if self._virtual is not None:
             self._virtual.unfollow(self._set_virtual_time)
 
-    def schedule(self, delay_s: float, callback: Callable[[], object]) -> TimerHandle:
+    def schedule(self, delay_s: float, callback: Callable[[], object]) -> ScheduledCall:
         """Call ``callback`` once, by the node's current time."""
         if self.is_simulated:
             return self._sim_timers.add(delay_s, callback)
@@ -301,7 +300,7 @@ class _DelayedCall:
         self._clock = clock
         self._delay_s = delay_s
         self._callback = callback
-        self._timer: TimerHandle | None = None
+        self._timer: ScheduledCall | None = None
 
     def start(self) -> None:
         """Start the delay now."""

@@ -51,9 +51,6 @@ class VirtualLoop(BaseLoop):
         """Return true: the only thread is the test's."""
         return True
 
-    def overlap(self) -> None:
-        """Do nothing: calls never overlap."""
-
     def _schedule(self, call: ScheduledCall) -> ScheduledCall:
         self._timers.add(call)
         return call

@@ -12,9 +12,9 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from composer.behavior import CallCancelled, Logger
+from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.futures import Cancelled, Future
 from composer.runtime.executors.strand import InlineStrand, OuterCoroutine, Strand, Work
-from composer.runtime.executors.tasks import SupportsCallLater
 from composer.runtime.executors.tracebacks import calls_user_code, is_closing, text_of
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.metrics.statistics import Statistics
@@ -24,19 +24,6 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
-
-
-class TaskLoop(SupportsCallLater, Protocol):
-    """The part of a loop that user code needs."""
-
-    def call_soon(self, callback: Callable[[], object]) -> None:
-        """Call ``callback`` as soon as the loop is free."""
-
-    def overlap(self) -> None:
-        """Let other threads serve the loop while a callback runs, if it is parallel."""
-
-    def run_task(self, coroutine: Coroutine[Any, Any, T]) -> Future[T]:
-        """Run a coroutine; return the future of its result."""
 
 
 class Faults(Protocol):
@@ -54,7 +41,7 @@ class UserCode:
 
     __slots__ = ()
 
-    loop: TaskLoop
+    loop: BaseLoop
     gate: LifecycleGate
     strand: Strand
     log: Logger

@@ -29,7 +29,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock import Clock
 from composer.runtime.executors import readiness
 from composer.runtime.executors.base_loop import BaseLoop
-from composer.runtime.executors.readiness import RclSource, SetCallback
+from composer.runtime.executors.readiness import EntitySource, SetCallback
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ _RETRY_AFTER_S = 0.001
 LAST_RETRY_AFTER_S = 2.0
 
 
-class ActionSource(RclSource):
+class ActionSource(EntitySource):
     """Everything that an action server or client receives, one item at a time."""
 
     def __init__(

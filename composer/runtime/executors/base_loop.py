@@ -23,7 +23,7 @@ _SWEEP_SIZE = 64  # entries at which canceled calls are removed
 class ScheduledCall:
     """A call that is due at ``due_s``, and each ``period_s`` seconds after that if it has one.
 
-    ``monotonic()`` returns the time that it follows.
+    ``monotonic()`` returns the time that it follows. Canceling it twice is harmless.
     """
 
     __slots__ = ("_monotonic", "callback", "cancelled", "due_s", "period_s")
@@ -51,7 +51,7 @@ class ScheduledCall:
 
     @property
     def late_s(self) -> float:
-        """How long ago the call was due, in seconds."""
+        """How long ago the call was due, in seconds. Valid during the call."""
         return (self._monotonic() - self.due_s) / self.per_s
 
     def cancel(self) -> None:
@@ -219,6 +219,9 @@ class BaseLoop(ABC):
     @abstractmethod
     def is_current(self) -> bool:
         """Return whether the calling thread belongs to the loop."""
+
+    def overlap(self) -> None:  # noqa: B027  most loops are not
+        """Let other threads serve the loop while a callback runs, if it is parallel."""
 
     @abstractmethod
     def _schedule(self, call: ScheduledCall) -> ScheduledCall:

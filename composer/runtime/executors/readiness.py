@@ -17,6 +17,7 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
@@ -130,38 +131,24 @@ class Signal:
         os.close(self.fd)
 
 
-class EntitySource(Protocol):
+class EntitySource(ABC):
     """One entity that a loop serves: one item at a time, so that a loop can serve them in turn.
 
     ``may_skip`` is true if a take may return nothing although more items follow. A client receives
-    all responses of its service and skips those to other clients.
+    all responses of its service and skips those to other clients. ``take()`` returns the next item,
+    or None, and ``call(item)`` passes it to its callback.
     """
 
-    @property
-    def may_skip(self) -> bool:
-        """See above."""
+    __slots__ = ("_handle", "_setters")
+
+    may_skip: bool
+    take: Callable[[], Any]
+    call: Callable[[Any], object]
 
     @property
+    @abstractmethod
     def name(self) -> str:
         """A description of the entity, for reports."""
-
-    def attach(self, signal: Signal) -> None:
-        """Make ``signal`` signal the items of the entity."""
-
-    def detach(self, signal: Signal) -> None:
-        """Stop that."""
-
-    def take(self) -> Any:
-        """Return the next item, or None."""
-
-    def call(self, taken: Any, /) -> object:
-        """Pass the item to its callback."""
-
-
-class RclSource:
-    """The part of a source that rcl signals: the handle of an entity, and how it is signaled."""
-
-    __slots__ = ("_handle", "_setters")
 
     def __init__(self, handle: Handle, *setters: SetCallback) -> None:
         self._handle = handle

@@ -25,7 +25,7 @@ from composer.runtime.executors.readiness import (
     MESSAGE,
     REQUEST,
     RESPONSE,
-    RclSource,
+    EntitySource,
     Signal,
     SourceGroup,
 )
@@ -54,7 +54,7 @@ def unused_callback(_: Any, response: Any) -> Any:
     return response
 
 
-class SubscriptionSource(RclSource):
+class SubscriptionSource(EntitySource):
     """Calls ``callback((message, information))`` for each message."""
 
     __slots__ = ("_subscription", "call", "take")
@@ -75,7 +75,7 @@ class SubscriptionSource(RclSource):
         return f"subscription '{self._subscription.topic}' ({name_of(self.call)})"
 
 
-class ServiceSource(RclSource):
+class ServiceSource(EntitySource):
     """Calls ``callback(request, reply)`` for each request."""
 
     may_skip = False
@@ -156,7 +156,7 @@ def rclpy_callback(service: Any, run_task: RunTask) -> Callable[[Any, Reply], No
     return call
 
 
-class ClientSource(RclSource):
+class ClientSource(EntitySource):
     """Completes the futures of ``client.call_async``."""
 
     may_skip = True
@@ -224,7 +224,7 @@ class EventCounts:
         return lambda: self._loop.remove_group(group)
 
 
-class _EventSource(RclSource):
+class _EventSource(EntitySource):
     """One kind of event of an endpoint. A group signals a new source once by itself."""
 
     may_skip = True
@@ -234,7 +234,12 @@ class _EventSource(RclSource):
             self._event = rclpy_implementation.EventHandle(endpoint, kind)
         super().__init__(self._event, EVENT)
         self._callback = callback
-        self.name = kind.name
+        self._kind = kind
+
+    @property
+    def name(self) -> str:
+        """The kind of event."""
+        return self._kind.name
 
     def detach(self, signal: Signal) -> None:
         """Signal nothing more, and release the event."""

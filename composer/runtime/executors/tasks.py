@@ -26,14 +26,6 @@ class Cancellable(Protocol):
         """Do not make the call."""
 
 
-class TimerHandle(Cancellable, Protocol):
-    """A scheduled call of a loop. Canceling it twice is harmless."""
-
-    @property
-    def late_s(self) -> float:
-        """How long ago the call was due, in seconds. Valid during the call."""
-
-
 class SupportsCallLater(Protocol):
     """A loop, which waits by the steady clock, or a node's clock."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from composer.model import Timer, TimerClock
 from composer.runtime.callbacks.callback import EMPTY, Callback, mutation_checked
 from composer.runtime.callbacks.user_code import queue_for
-from composer.runtime.executors.tasks import TimerHandle
+from composer.runtime.executors.base_loop import ScheduledCall
 from composer.runtime.ports import RunningPort
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class TimerPort(Callback, RunningPort):
             handle = handler  # without a frame in between
         super().__init__(context, f"on_{name}", handle, statistics, timer.budget_ms)
         self._queue = queue_for(context, self._call, None, depth=0, reentrant=timer.reentrant)
-        self._scheduled: TimerHandle | None = None
+        self._scheduled: ScheduledCall | None = None
         self._on_time = self._tick
         if context.instruments is not None:
             self._on_time = context.instruments.timer(context.names["node"], name, self._tick)
