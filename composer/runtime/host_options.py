@@ -14,17 +14,17 @@ from composer.runtime.clock import COMPUTER, Clock
 R = TypeVar("R")
 
 
-class Tap(Protocol):
-    """Receives the messages of a topic."""
+class Target(Protocol):
+    """Receives messages in this process."""
 
-    def put(self, message: Any) -> None:
-        """Receive a message, from any thread. It must not wait."""
+    def put(self, message: Any, /) -> None:
+        """Receive the message, from any thread. It must not wait."""
 
 
 class Recorder(Protocol):
     """Receives what the nodes in the process send: messages, calls, transitions, the log."""
 
-    def tap(self, topic: str, type_name: str, profile: QosProfile) -> Tap | None:
+    def tap(self, topic: str, type_name: str, profile: QosProfile) -> Target | None:
         """Return what receives the messages of a topic; None if it is not recorded."""
 
     def save(self, done: Callable[[bool, str], None]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from typing import Any, Protocol
+from typing import Any
 
 from numpy import ndarray
 from rclpy.publisher import Publisher
@@ -13,15 +13,9 @@ from rclpy.serialization import deserialize_message
 
 from composer.base.fast_dataclass import dataclass
 from composer.runtime.clock import Clock
+from composer.runtime.host_options import Target
 from composer.runtime.intra_process.dds_flags import MATCH_FLAG, MATCHING
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
-
-
-class Target(Protocol):
-    """Receives messages in this process."""
-
-    def put(self, message: Any, /) -> None:
-        """Receive the message, from any thread."""
 
 
 class FanOut:

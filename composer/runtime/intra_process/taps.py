@@ -24,8 +24,7 @@ from composer.model.qos import QosProfile
 from composer.model.system import EVENT_TOPIC
 from composer.runtime.clock import Clock
 from composer.runtime.executors.sources import Reply
-from composer.runtime.host_options import Recorder
-from composer.runtime.intra_process.publisher import Target
+from composer.runtime.host_options import Recorder, Target
 from composer.runtime.intra_process.topic import CopyingTarget
 
 _SERVER = ServiceEventInfo.REQUEST_RECEIVED, ServiceEventInfo.RESPONSE_SENT

@@ -24,12 +24,12 @@ from composer.model.qos import Durability, Liveliness, QosProfile, incompatibili
 from composer.runtime.clock import Clock
 from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.tasks import Cancellable
+from composer.runtime.host_options import Target
 from composer.runtime.intra_process.dds_flags import MATCHING, MatchListener
 from composer.runtime.intra_process.publisher import (
     FanOut,
     GatedPublisher,
     PublisherContext,
-    Target,
     combined,
     copy_of,
 )

@@ -14,7 +14,7 @@ from composer.model import Node
 from composer.model.qos import QosProfile
 from composer.runtime.callbacks.observers import Chains, MessageSnapshots
 from composer.runtime.executors.sources import EventCounts
-from composer.runtime.host_options import Instruments, Recorder, Tap
+from composer.runtime.host_options import Instruments, Recorder, Target
 from composer.runtime.intra_process.router import LocalRouter
 from composer.runtime.node.managed_node import ManagedContext
 from composer.runtime.node_time import SimTimeSource
@@ -99,7 +99,7 @@ class _RecordedEvents:
     """The publisher of /parameter_events of a node, recorded."""
 
     publisher: Any
-    tap: Tap
+    tap: Target
 
     def publish(self, event: ParameterEvent) -> None:
         """Publish and record an event."""

@@ -24,7 +24,7 @@ from composer.base.fast_dataclass import dataclass
 from composer.model import Port, PortKind
 from composer.model.qos import Liveliness, incompatibilities
 from composer.runtime.callbacks.context import NodeContext
-from composer.runtime.intra_process.publisher import Target
+from composer.runtime.host_options import Target
 from composer.runtime.intra_process.topic import (
     Leases,
     MonitoredReceiver,

@@ -15,7 +15,8 @@ from composer.runtime.callbacks.callback import mutation_checked
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.callbacks.observers import RememberingTarget
 from composer.runtime.callbacks.reactions import MessageReaction
-from composer.runtime.intra_process.publisher import PublisherContext, Target
+from composer.runtime.host_options import Target
+from composer.runtime.intra_process.publisher import PublisherContext
 from composer.runtime.intra_process.topic import LatchedMessages
 from composer.runtime.ports import RunningPort
 from composer.runtime.ports.mailbox import Mailbox, OverlappingMailbox
