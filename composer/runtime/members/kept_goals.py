@@ -34,8 +34,10 @@ class KeptGoals:
 
     def keep(self, goals: Mapping[str, PrimaryState], activity: str) -> None:
         """Keep goals by the keys of nodes, if they are new ones."""
+        if self._path is None:
+            return
         new = SystemGoals(activity, {self._names[name]: goal for name, goal in goals.items()})
-        if self._path is not None and new != self._last:
+        if new != self._last:
             self._last = new
             with suppress(OSError):
                 write_whole(self._path, encode(new))
