@@ -8,7 +8,7 @@ from dataclasses import replace
 from composer.base.diagnostics import Diagnostic, Severity
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import Span
-from composer.graph.diagram import Mark, Problem, worst
+from composer.graph.diagram import Cluster, Edge, EdgeKind, Mark, Problem, worst
 from composer.graph.facts import (
     node_facts,
     port_facts,
@@ -16,7 +16,7 @@ from composer.graph.facts import (
     qos_label,
     transform_facts,
 )
-from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort, SceneTransform, Wait
+from composer.graph.scene import Scene, SceneNode, ScenePort, SceneTransform
 from composer.model import (
     DEFAULT_EXECUTOR,
     Executor,
@@ -159,8 +159,8 @@ def _transforms(node: Node, problems: _Problems) -> Iterator[SceneTransform]:
         )
 
 
-def _waits(system: System) -> Iterator[Wait]:
-    names = {node.name.value: node.full_name for node in system.nodes}
+def _waits(system: System) -> Iterator[Edge]:
+    keys = {node.name.value: f"node:{node.full_name}" for node in system.nodes}
     states = {
         (node.name.value, dependency.node.value): dependency.state.value
         for node in system.nodes
@@ -170,10 +170,12 @@ def _waits(system: System) -> Iterator[Wait]:
         if edge.implied and (edge.node, edge.on) in states:
             continue  # declared already
         reason = f"serves {edge.serves}" if edge.implied else f"once {states[edge.node, edge.on]}"
-        yield Wait(names[edge.node], names[edge.on], reason, edge.implied)
+        source, target = keys[edge.on], keys[edge.node]
+        kind = EdgeKind.IMPLIED if edge.implied else EdgeKind.DEPENDENCY
+        yield Edge(f"{source} -> {target} {reason}", source, target, kind, (reason,))
 
 
-def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
+def _groups(system: System, several: bool) -> Iterator[Cluster]:
     declared = {executor.name.value: executor for executor in system.executors}
     hosts = {
         f"{_PROCESS}{process.name}": f" on {process.host}"
@@ -192,7 +194,7 @@ def _groups(system: System, several: bool) -> Iterator[ExecutorGroup]:
         has_kind = name not in _OUTSIDE.values() and not name.startswith((_PROCESS, _CONTAINER))
         label = f"{prefix}{name}: {kind}" if has_kind else f"{prefix}{name}{hosts.get(name, '')}"
         parent = _executor_key(system, around[name]) if name in around else ""
-        yield ExecutorGroup(_executor_key(system, name), label, parent)
+        yield Cluster(_executor_key(system, name), label, parent)
 
 
 def _executor_name(node: Node, system: System) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from composer.graph.diagram import Details, Problem, parent_of
+from composer.graph.diagram import Cluster, Details, Problem, parent_of
 from composer.graph.facts import discovered_qos_facts, discovered_qos_label
-from composer.graph.scene import ExecutorGroup, Scene, SceneNode, ScenePort
+from composer.graph.scene import Scene, SceneNode, ScenePort
 from composer.language.document.scalars import with_json_numbers
 from composer.language.tree import Plain
 from composer.model import PortKind
@@ -40,16 +40,16 @@ def live_scene_of(snapshot: Snapshot, rates_hz: Mapping[str, float]) -> Scene:
     )
 
 
-def _groups(snapshot: Snapshot) -> Iterator[ExecutorGroup]:
+def _groups(snapshot: Snapshot) -> Iterator[Cluster]:
     """Return hosts and their processes, as far as nodes of them are drawn."""
     drawn = {node.full_name for node in snapshot.nodes if not node.is_hidden}
     processes = [process for process in snapshot.processes if drawn.intersection(process.nodes)]
     for host in sorted({process.host for process in processes if process.host}):
-        yield ExecutorGroup(f"host:{host}", f"host {host}")
+        yield Cluster(f"host:{host}", f"host {host}")
     for process in processes:
         number = f": process {process.pid}" if process.pid else ": no response"
         parent = f"host:{process.host}" if process.host else ""
-        yield ExecutorGroup(_key(process), f"{process.name}{number}", parent)
+        yield Cluster(_key(process), f"{process.name}{number}", parent)
 
 
 def _key(process: ObservedProcess) -> str:

@@ -64,16 +64,7 @@ def lifecycle_view(scene: Scene) -> Graph:
             )
             for node in scene.nodes
         ),
-        edges=tuple(
-            Edge(
-                key=f"node:{wait.waited_for} -> node:{wait.waiting} {wait.reason}",
-                source=f"node:{wait.waited_for}",
-                target=f"node:{wait.waiting}",
-                kind=EdgeKind.IMPLIED if wait.implied else EdgeKind.DEPENDENCY,
-                lines=(wait.reason,),
-            )
-            for wait in scene.waits
-        ),
+        edges=scene.waits,
         clusters=namespaces.clusters(),
     )
 
@@ -92,7 +83,7 @@ def deployment_view(scene: Scene) -> Graph:
             for node in scene.nodes
         ),
         edges=tuple(_deployment_edges(scene)),
-        clusters=tuple(Cluster(group.key, group.label, group.parent) for group in scene.executors),
+        clusters=scene.executors,
     )
 
 

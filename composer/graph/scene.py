@@ -11,7 +11,7 @@ from itertools import chain, product
 from typing import TypeVar
 
 from composer.base.fast_dataclass import dataclass
-from composer.graph.diagram import Details, Problem
+from composer.graph.diagram import Cluster, Details, Edge, Problem
 from composer.model import ChannelKind, PortKind
 from composer.model.dependencies import by_channel
 
@@ -48,8 +48,8 @@ class SceneNode:
     """A node. ``full_name`` is unique in a scene.
 
     ``note`` is shown below the name. ``state`` is the current lifecycle state, or the state after
-    bring-up; empty without one. ``steps`` are its bring-up steps. ``executor`` is the key of its
-    executor group, empty if unknown.
+    bring-up; empty without one. ``steps`` are its bring-up steps. ``executor`` is the key of what
+    runs it, empty if unknown.
     """
 
     name: str
@@ -62,31 +62,6 @@ class SceneNode:
     ports: tuple[ScenePort, ...] = ()
     details: Details = ()
     problem: Problem | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Wait:
-    """A dependency: ``waiting`` waits for ``waited_for``; both are full names.
-
-    ``implied`` is true if it follows from a service or action.
-    """
-
-    waiting: str
-    waited_for: str
-    reason: str
-    implied: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ExecutorGroup:
-    """What runs nodes, and its label: an executor, a process, or a host around processes.
-
-    ``parent`` is the key of the group around it, which comes before it; empty without one.
-    """
-
-    key: str
-    label: str
-    parent: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,14 +81,16 @@ class SceneTransform:
 class Scene:
     """Everything to draw.
 
-    ``rates_hz`` are the measured rates of topics with several publishers. ``is_live`` is whether
-    the states of nodes are observed.
+    ``waits`` are the dependencies: arrows from a node to those that wait for it. ``executors`` are
+    what runs nodes: executors, processes, and hosts around processes. ``rates_hz`` are the
+    measured rates of topics with several publishers. ``is_live`` is whether the states of nodes are
+    observed.
     """
 
     title: str
     nodes: tuple[SceneNode, ...]
-    waits: tuple[Wait, ...] = ()
-    executors: tuple[ExecutorGroup, ...] = ()
+    waits: tuple[Edge, ...] = ()
+    executors: tuple[Cluster, ...] = ()
     transforms: tuple[SceneTransform, ...] = ()
     rates_hz: Mapping[str, float] = field(default_factory=dict)
     is_live: bool = False
