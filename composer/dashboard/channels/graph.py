@@ -1,4 +1,4 @@
-"""``graph``: the diagram of the ROS graph or of the system; ``graph.live``: states and rates."""
+"""``graph``: the diagram of the ROS graph or of the system; ``graph.live``: rates in it."""
 
 from __future__ import annotations
 
@@ -26,11 +26,6 @@ _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
 _MANAGER = "manager"
-#: What is shown of the report of a node.
-_SHOWN = (
-    *("state", "desired", "since_s", "errors", "restarts", "held_down", "condition"),
-    *("last_error", "pid", "host"),
-)
 #: While the graph changes.
 _SOON_S = 0.1
 
@@ -101,7 +96,7 @@ class PictureFeed(Feed):
 
 
 class LiveFeed(Feed):
-    """States of nodes, and rates and drops of edges, once a second.
+    """Rates and drops of edges, once a second.
 
     Rates of a system are in its reports. Other topics are measured.
     """
@@ -121,17 +116,10 @@ class LiveFeed(Feed):
         self.resources.callback(self._set_measured, set())
 
     def poll(self) -> Iterator[Update]:
-        """Yield all states and rates."""
-        from composer.client.systems.local_queries import of_whole_systems
-
+        """Yield all rates."""
         # Sorted: what other processes of a system report of their nodes is newer, and comes later.
         current = sorted(self.ros.reports.current().items())
         reports = {name: report for name, report in current if report is not None}
-        states = self.ros.states().items()
-        nodes: dict[str, Any] = {name: {"state": state} for name, state in states}
-        for system in of_whole_systems(reports).values():
-            for node in system.nodes:
-                nodes[node.node] = {key: getattr(node, key) for key in _SHOWN}
         edges: dict[str, Any] = {}
         reported: set[str] = set()
         for report in reports.values():
@@ -140,7 +128,7 @@ class LiveFeed(Feed):
                 edges |= self._edges(node, report.at_s)
         self._rates = {key: rate for key, rate in self._rates.items() if key in edges}
         topics = self._measure(reported)
-        yield Update(to_json({"nodes": nodes, "edges": edges, "topics": topics}))
+        yield Update(to_json({"edges": edges, "topics": topics}))
 
     def _edges(self, node: NodeReport, now_s: float) -> dict[str, Any]:
         """Return the rates of the topics of a node by the keys of their edges."""

@@ -119,9 +119,19 @@ export function createView(app) {
     select(wanted);
   }
 
-  function receiveLive(data, { dropped }) {
+  function receiveRates(data, { dropped }) {
     note.show(dropped);
-    live = data;
+    update(data);
+  }
+
+  /** Take the states from the frame, which receives them for all views. */
+  function showStates() {
+    const known = (app.nodes?.nodes ?? []).filter(({ system, state }) => system || state !== "");
+    update({ nodes: Object.fromEntries(known.map((node) => [node.name, node])) });
+  }
+
+  function update(data) {
+    live = { ...live, ...data };
     overlay?.show(live);
     article?.update(live);
   }
@@ -178,8 +188,10 @@ export function createView(app) {
     diagram = app.connection.subscribe("graph", { view, ...place }, draw, { onerror: fail });
     ends = [
       diagram,
-      app.connection.subscribe("graph.live", {}, receiveLive),
+      app.connection.subscribe("graph.live", {}, receiveRates),
     ];
+    showStates();
+    addEventListener("nodeschange", showStates);
     document.addEventListener("keydown", onkey);
   }
 
@@ -204,6 +216,7 @@ export function createView(app) {
     article = null;
     for (const subscription of ends) subscription.end();
     ends = [];
+    removeEventListener("nodeschange", showStates);
     document.removeEventListener("keydown", onkey);
     if (picture && selection.isOpen()) {
       selection.unmark();
