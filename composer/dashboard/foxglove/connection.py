@@ -34,7 +34,7 @@ from composer.dashboard.foxglove.messages import (
 )
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, Values, unknown
 from composer.dashboard.protocol.outbox import Delivery, Outbox, Update, Waiting
-from composer.dashboard.web.client import Running
+from composer.dashboard.web.client import End
 
 if TYPE_CHECKING:
     from composer.client.session import Deadline
@@ -69,8 +69,8 @@ class FoxgloveConnection(Link):
         super().__init__(server.dashboard, socket, Outbox(_compose, _MAX_WAITING))
         self._server = server
         self._known = Contents()
-        self._catalog: Running | None = None
-        self._clock: Running | None = None
+        self._end_catalog: End | None = None
+        self._end_clock: End | None = None
         self._unknown: set[str] = set()
         self._subscriptions = Subscriptions(self)
         self._publications = Publications(self)
@@ -83,12 +83,12 @@ class FoxgloveConnection(Link):
 
     def _begin(self) -> None:
         self._send_info()
-        self._catalog = self.follow("catalog", CatalogFeed(self._server.catalog), self._on_catalog)
+        catalog = CatalogFeed(self._server.catalog)
+        self._end_catalog = self.follow("catalog", catalog, self._on_catalog)
 
     def _end(self) -> None:
-        for running in (self._catalog, self._clock):
-            if running is not None:
-                self.stop(running)
+        for end in filter(None, (self._end_catalog, self._end_clock)):
+            end()
         self._subscriptions.end()
         self._publications.end()
 
@@ -159,11 +159,11 @@ class FoxgloveConnection(Link):
         self._offer_channels(before)
         if not self.is_read_only:
             self._offer_services(before)
-        if self._known.has_clock and self._clock is None:
+        if self._known.has_clock and self._end_clock is None:
             self._send_info()
             self._outbox.open(_TIME, "", Delivery.LATEST)
             send = partial(self._outbox.put, _TIME)
-            self._clock = self.follow("clock", ClockFeed(), send)
+            self._end_clock = self.follow("clock", ClockFeed(), send)
 
     def _offer_channels(self, before: Contents) -> None:
         gone, new = changes(before.channels, self._known.channels)

@@ -20,7 +20,7 @@ from composer.dashboard.protocol.messages import (
     to_json,
 )
 from composer.dashboard.protocol.outbox import Budget, Delivery, Outbox, Update
-from composer.dashboard.web.client import POLICY_VIOLATION, Client, Running
+from composer.dashboard.web.client import POLICY_VIOLATION, Client, End
 from composer.model.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Link(Client):
         error = json.loads(update.data)
         self.say(WARNING, error_text(RequestError(error["code"], error["message"], error["hint"])))
 
-    def follow(self, name: str, feed: Feed, take: Any) -> Running:
+    def follow(self, name: str, feed: Feed, take: Any) -> End:
         """Receive a feed, whose errors are said; ``take`` gets its other updates."""
 
         def receive(update: Update) -> None:
@@ -223,7 +223,7 @@ class Subscriptions:
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._running: dict[int, tuple[int, Running]] = {}
+        self._running: dict[int, tuple[int, End]] = {}
         self._slow: set[int] = set()
 
     def subscribe(self, values: Values, channels: Offers) -> None:
@@ -264,10 +264,10 @@ class Subscriptions:
                 self._end(identifier)
 
     def _end(self, identifier: int) -> None:
-        _, running = self._running.pop(identifier)
+        _, end = self._running.pop(identifier)
         self._slow.discard(identifier)
         self._link.outbox.close(identifier)
-        self._link.stop(running)
+        end()
 
     def _sender(self, identifier: int, topic: str) -> Callable[[Update], None]:
         outbox = self._link.outbox
@@ -294,7 +294,7 @@ class Publications:
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._running: dict[int, tuple[PublishedFeed, Running]] = {}
+        self._running: dict[int, tuple[PublishedFeed, End]] = {}
 
     def advertise(self, values: Values) -> None:
         """Create publishers as a message requests. Raises RequestError."""
@@ -310,8 +310,8 @@ class Publications:
             budget = self._link.outbox.budget
             feed = PublishedFeed(topic, type_name, wanted.text("encoding"), budget)
             budget.take(feed.size)
-            running = self._link.start("foxglove publisher", feed, self._link.say_error)
-            self._running[identifier] = feed, running
+            end = self._link.start("foxglove publisher", feed, self._link.say_error)
+            self._running[identifier] = feed, end
 
     def unadvertise(self, values: Values) -> None:
         """Destroy publishers as a message requests. Raises RequestError."""
@@ -331,8 +331,8 @@ class Publications:
             self._end(identifier)
 
     def _end(self, identifier: int) -> None:
-        feed, running = self._running.pop(identifier)
-        self._link.stop(running)
+        feed, end = self._running.pop(identifier)
+        end()
         feed.forget()
         self._link.outbox.budget.give(feed.size)
 

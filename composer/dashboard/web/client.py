@@ -11,12 +11,12 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from composer.base.characters import escape_line
-from composer.base.fast_dataclass import dataclass
 from composer.dashboard.context import Dashboard, Run
 from composer.dashboard.feeds import Feed, Receiver
 from composer.dashboard.protocol.messages import BadRequestError, RequestError, internal_error
@@ -32,12 +32,8 @@ _MAX_MALFORMED = 20
 POLICY_VIOLATION, _GOING_AWAY = 1008, 1001
 
 
-@dataclass(frozen=True, slots=True)
-class Running:
-    """A feed that a program receives."""
-
-    key: str
-    receiver: Receiver
+#: Ends a subscription to a feed.
+End = Callable[[], None]
 
 
 class Client(ABC):
@@ -102,15 +98,11 @@ class Client(ABC):
         if self.is_read_only:
             raise RequestError("read_only", f"{what} is not possible: the dashboard is read-only")
 
-    def start(self, key: str, feed: Feed, take: Callable[[Update], None]) -> Running:
+    def start(self, key: str, feed: Feed, take: Callable[[Update], None]) -> End:
         """Receive a feed, which programs share under this key if it can be shared."""
-        running = Running(key if feed.is_shared else f"{key} {id(feed)}", self._receiver(take))
-        self._dashboard.feeds.add(running.key, feed, running.receiver)
-        return running
-
-    def stop(self, running: Running) -> None:
-        """Receive a feed no longer."""
-        self._dashboard.feeds.remove(running.key, running.receiver)
+        key, receiver = key if feed.is_shared else f"{key} {id(feed)}", self._receiver(take)
+        self._dashboard.feeds.add(key, feed, receiver)
+        return partial(self._dashboard.feeds.remove, key, receiver)
 
     def request(
         self,

@@ -29,7 +29,7 @@ from composer.dashboard.protocol.messages import (
     unknown,
 )
 from composer.dashboard.protocol.outbox import Outbox
-from composer.dashboard.web.client import Client, Running
+from composer.dashboard.web.client import Client, End
 
 _MAX_SUBSCRIPTIONS = 64
 #: Operations of the connection itself.
@@ -39,9 +39,9 @@ _OWN = ("subscribe", "unsubscribe", "update", "cancel", "ping")
 @dataclass(slots=True)
 class _Subscription:
     channel: str
-    running: Running
     feed: Feed
     size: int
+    end: End
 
 
 class Connection(Client):
@@ -165,8 +165,8 @@ class Connection(Client):
         key = f"{channel} {to_json(parameters)}"
         size = 2 * len(key)  # its parameters are kept as values and as text
         self._outbox.budget.take(size)
-        running = self.start(key, feed, lambda update: self._outbox.put(number, update))
-        return _Subscription(channel, running, feed, size)
+        end = self.start(key, feed, lambda update: self._outbox.put(number, update))
+        return _Subscription(channel, feed, size, end)
 
     def _unsubscribe(self, number: int) -> None:
         subscription = self._subscriptions.pop(number)
@@ -174,5 +174,5 @@ class Connection(Client):
         self._leave(subscription)
 
     def _leave(self, subscription: _Subscription) -> None:
-        self.stop(subscription.running)
+        subscription.end()
         self._outbox.budget.give(subscription.size)
