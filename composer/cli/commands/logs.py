@@ -235,11 +235,9 @@ def _print(record: Record, *, json: bool) -> None:
 
         write(as_json(record.content()))
         return
-    from composer.cli.support.line_format import Line, LineFormat, file_format
-    from composer.cli.support.progress import continued
+    from composer.cli.support.line_format import LineFormat, file_format
 
-    line = Line(record.level.upper(), record.logger, continued(record.message), record.time_ns)
-    text = LineFormat(file_format()).render(line)
+    text = LineFormat(file_format()).render(record)
     color = _COLORS.get(record.level)
     if color and use_color(sys.stdout):
         write_raw(f"\x1b[{color}m{text}\x1b[0m\n")

@@ -9,9 +9,12 @@ import os
 import re
 from collections.abc import Callable
 from datetime import datetime
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from composer.base.fast_dataclass import dataclass
+from composer.base.characters import escape_lines
+
+if TYPE_CHECKING:
+    from composer.client.run_log.reading import Record
 
 CONSOLE_FORMAT_VARIABLE = "RCUTILS_CONSOLE_OUTPUT_FORMAT"
 _FILE_FORMAT = "[{date_time_with_ms}] [{severity}] [{name}] {message}"
@@ -19,19 +22,10 @@ _TOKEN = re.compile(r"\{(\w+)\}")
 _NANOSECONDS = 1_000_000_000
 #: In the format, as in rcutils.
 _ESCAPES = {"\\n": "\n", "\\t": "\t"}
+_INDENT = "  "
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
-    """What a line of the log is about; ``time_ns`` counts from the Unix epoch."""
-
-    severity: str
-    name: str
-    message: str
-    time_ns: int
-
-
-_Part: TypeAlias = Callable[[Line], str]
+_Part: TypeAlias = "Callable[[Record], str]"
 
 
 class LineFormat:
@@ -46,9 +40,9 @@ class LineFormat:
             for index, piece in enumerate(pieces)
         ]
 
-    def render(self, line: Line) -> str:
-        """Return the text of a line."""
-        return "".join(part(line) for part in self._parts)
+    def render(self, record: Record) -> str:
+        """Return a record as text."""
+        return "".join(part(record) for part in self._parts)
 
 
 def console_format() -> LineFormat | None:
@@ -67,13 +61,18 @@ def file_format() -> str:
     return _FILE_FORMAT if text == CONSOLE_FORMAT else text
 
 
-def _seconds(line: Line) -> str:
-    return f"{line.time_ns // _NANOSECONDS}.{line.time_ns % _NANOSECONDS:09}"
+def continued(text: str) -> str:
+    """Return ``text`` with all lines but the first indented: a message must not look like two."""
+    return escape_lines(text).replace("\n", f"\n{_INDENT}")
 
 
-def _date_and_time(line: Line) -> str:
+def _seconds(record: Record) -> str:
+    return f"{record.time_ns // _NANOSECONDS}.{record.time_ns % _NANOSECONDS:09}"
+
+
+def _date_and_time(record: Record) -> str:
     # In the local time zone, as rcutils writes it.
-    at = datetime.fromtimestamp(line.time_ns / _NANOSECONDS)
+    at = datetime.fromtimestamp(record.time_ns / _NANOSECONDS)
     return at.isoformat(sep=" ", timespec="milliseconds")
 
 
@@ -83,11 +82,11 @@ def _constant(text: str) -> _Part:
 
 #: The place in the source code is not known.
 _TOKENS: dict[str, _Part] = {
-    "severity": lambda line: line.severity,
-    "name": lambda line: line.name,
-    "message": lambda line: line.message,
+    "severity": lambda record: record.level.upper(),
+    "name": lambda record: record.logger,
+    "message": lambda record: continued(record.message),  # the format itself may have colors
     "time": _seconds,
-    "time_as_nanoseconds": lambda line: str(line.time_ns),
+    "time_as_nanoseconds": lambda record: str(record.time_ns),
     "date_time_with_ms": _date_and_time,
     "function_name": _constant(""),
     "file_name": _constant(""),

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO
 
-from composer.base.characters import counted, escape_lines
+from composer.base.characters import counted
 from composer.cli.support.callback_tables import summary_table
 from composer.cli.support.console import OutputQueue
-from composer.cli.support.line_format import Line, LineFormat
+from composer.cli.support.line_format import LineFormat, continued
 from composer.cli.support.process import report_ready, take_ready_descriptor
 from composer.cli.support.terminal import columns, lines, say, use_color
 from composer.client.run_log import RotatingFile, RunFolder
@@ -37,7 +37,6 @@ from composer.runtime.supervision.events import (
 
 _GREEN, _YELLOW, _RED, _DIM = "32", "33", "31", "2"
 _MAX_CALLBACKS = 10
-_INDENT = "  "
 _MAX_NODES_WITH_ERRORS = 5
 
 
@@ -76,24 +75,11 @@ class Progress:
         self._stream.write(f"{line}\n")
 
     def _line(self, event: Event) -> str:
-        name, text = logger_and_text(event)
-        text = continued(text)  # not the line: a format may have colors
-        severity = severity_of(event)
-        if self._format is None:
-            return f"[{event.elapsed_s:.3f}] [{severity}] [{name}] {text}"
-        return self._format.render(Line(severity, name, text, time.time_ns()))
-
-
-def logger_and_text(event: Event) -> tuple[str, str]:
-    """Return the name of the logger that an event is shown with, and its text."""
-    if isinstance(event, Logged):
-        return event.logger, event.message
-    return PROGRAM_LOGGER, str(event)
-
-
-def continued(text: str) -> str:
-    """Return ``text`` with all lines but the first indented: a message must not look like two."""
-    return escape_lines(text).replace("\n", f"\n{_INDENT}")
+        record = _record(event)
+        if self._format is not None:
+            return self._format.render(record)
+        severity, text = record.level.upper(), continued(record.message)
+        return f"[{event.elapsed_s:.3f}] [{severity}] [{record.logger}] {text}"
 
 
 def severity_of(event: Event) -> str:
@@ -225,11 +211,11 @@ def run_log(system: str, *, part: bool = False, forwarded: bool = False) -> Iter
 
 
 def _record(event: Event) -> Record:
-    logger, text = logger_and_text(event)
     if isinstance(event, Logged):
+        logger, text = event.logger, event.message
         node = "" if logger == PROGRAM_LOGGER else "/" + logger.replace(".", "/")
     else:
-        node = getattr(event, "node", "")
+        logger, text, node = PROGRAM_LOGGER, str(event), getattr(event, "node", "")
     return Record(time.time_ns(), severity_of(event).lower(), logger, node, text)
 
 

@@ -8,12 +8,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from composer.cli.support.line_format import Line, LineFormat, console_format, file_format
+from composer.cli.support.line_format import LineFormat, console_format, file_format
 from composer.cli.support.progress import Progress, summary
+from composer.client.run_log.reading import Record
 from composer.model import LogLevel
 from composer.runtime.supervision.events import BroughtUp, Logged, NodeSummary, Outcome
 
-LINE = Line("WARN", "robot.planner", "no {name} yet", 1_700_000_000_012_345_678)
+RECORD = Record(1_700_000_000_012_345_678, "warn", "robot.planner", "", "no {name} yet")
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +39,7 @@ def time_zone() -> Iterator[None]:
     ],
 )
 def test_tokens_are_replaced_as_by_rcutils(text: str, expected: str) -> None:
-    assert LineFormat(text).render(LINE) == expected
+    assert LineFormat(text).render(RECORD) == expected
 
 
 def test_lines_begin_with_the_elapsed_time_or_have_the_format_of_the_user(
@@ -58,7 +59,7 @@ def test_lines_begin_with_the_elapsed_time_or_have_the_format_of_the_user(
         "[2.000] [INFO] [compose] 3 of 3 nodes active after 2.00 s\n"
     )
     # Log files have the date and time.
-    assert LineFormat(file_format()).render(LINE) == (
+    assert LineFormat(file_format()).render(RECORD) == (
         "[2023-11-14 22:13:20.012] [WARN] [robot.planner] no {name} yet"
     )
     monkeypatch.setenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", "{severity} {name}: {message}")
