@@ -290,7 +290,7 @@ def _outcome(change: Callable[[], CompletedTransition]) -> NodeOutcome:
 def _system_reports(session: Session, deadline: Deadline) -> dict[str, SystemReport | None]:
     """Return the reports of the known systems, None for those that do not respond."""
     systems = Systems(session, deadline)
-    limit = Deadline(min(REPORT_WITHIN_S, deadline.left_s))
+    limit = deadline.at_most(REPORT_WITHIN_S)
     return systems.reports({*systems.discover(), *local_systems()}, limit)
 
 

@@ -211,7 +211,7 @@ def parameter_settings(
     ``names`` are the parameters of each node. Nodes without the service, or that do not respond,
     are left out.
     """
-    limit = Deadline(min(_RESPONSE_S, deadline.left_s))
+    limit = deadline.at_most(_RESPONSE_S)
     with NodeServices(session) as services:
         known = services.nodes(DescribeParameters, limit)
         requests = {
@@ -260,7 +260,8 @@ class LoggerLevels:
         """Return the levels of all nodes that can be asked, None for those that do not respond."""
         self._session.wait_until_settled(self._systems.discover, self._deadline)
         self._session.wait_for(
-            lambda: None not in self._systems.current().values() or None, self._discovery
+            lambda: None not in self._systems.current().values() or None,
+            self._deadline.at_most(DISCOVERY_S),
         )
         servers = self._servers()
         by_server: dict[str, list[str]] = {}
@@ -304,17 +305,15 @@ class LoggerLevels:
     def _find(self, node: str) -> tuple[str, str]:
         """Return the full name of a node, and the node with the services for it."""
         found = GraphNames(self._session, self._deadline).find_node(node)
-        server = self._session.wait_for(lambda: self._servers().get(found), self._discovery)
+        server = self._session.wait_for(
+            lambda: self._servers().get(found), self._deadline.at_most(DISCOVERY_S)
+        )
         if server is None:
             raise RosError(
                 f"{found} has no services for log levels",
                 "start it with 'enable_logger_service' (rclpy, rclcpp)",
             )
         return found, server
-
-    @property
-    def _discovery(self) -> Deadline:
-        return Deadline(min(DISCOVERY_S, self._deadline.left_s))
 
     def _servers(self) -> dict[str, str]:
         """Return the nodes with the services, by the nodes that they serve."""

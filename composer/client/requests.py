@@ -107,7 +107,7 @@ def wait_until_known(session: Session, service: str, deadline: Deadline) -> bool
     read_service = _read_service(session, service)
     if read_service is None:
         return False
-    limit = Deadline(min(_KNOWN_WITHIN_S, deadline.left_s))
+    limit = deadline.at_most(_KNOWN_WITHIN_S)
     request = GetParameters.Request()
     with closing(ServiceCaller(session)) as caller:
         responses = caller.call_each({read_service: (GetParameters, request)}, limit)

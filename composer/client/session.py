@@ -65,6 +65,10 @@ class Deadline:
         """Whether no time remains."""
         return self.left_s <= 0.0
 
+    def at_most(self, seconds: float) -> Deadline:
+        """Return a time limit from now on that ends no later than this one."""
+        return Deadline(min(seconds, self.left_s))
+
 
 def use_command_profile() -> None:
     """Disable shared memory in this process: see :mod:`composer.runtime.middleware.environment`.

@@ -45,7 +45,7 @@ class GraphObserver:
         ends = dict(session.wait_until_settled(lambda: endpoints(graph), deadline))
         counts = Counter(node_names(graph))
         asked = self._asked(ends.keys(), GetState, deadline)
-        states = self._services.states(asked, self._limit(deadline))
+        states = self._services.states(asked, deadline.at_most(_RESPONSE_S))
         parameters = self.parameters(ends.keys(), deadline)
         containers = self._containers(deadline)
         return Snapshot(
@@ -90,7 +90,7 @@ class GraphObserver:
         except MessageError:
             return {}
         requests = dict.fromkeys(servers, kind.Request())
-        responses = self._services.call_all(kind, requests, self._limit(deadline))
+        responses = self._services.call_all(kind, requests, deadline.at_most(_RESPONSE_S))
         return {
             str(name): server.removesuffix(_CONTAINER)
             for server, response in responses.items()
@@ -104,13 +104,13 @@ class GraphObserver:
         """Return the parameters of the nodes that have any, None without a response."""
         asked = self._asked(nodes, ListParameters, deadline)
         lists = dict.fromkeys(asked, ListParameters.Request())
-        responses = self._services.call_all(ListParameters, lists, self._limit(deadline))
+        responses = self._services.call_all(ListParameters, lists, deadline.at_most(_RESPONSE_S))
         requests = {
             node: GetParameters.Request(names=sorted(response.result.names))
             for node, response in responses.items()
             if response is not None
         }
-        values = self._services.call_all(GetParameters, requests, self._limit(deadline))
+        values = self._services.call_all(GetParameters, requests, deadline.at_most(_RESPONSE_S))
         found: dict[str, dict[str, Plain] | None] = dict.fromkeys(responses)
         for node, response in values.items():
             names = requests[node].names
@@ -120,8 +120,5 @@ class GraphObserver:
 
     def _asked(self, nodes: Collection[str], kind: Any, deadline: Deadline) -> list[str]:
         """Return the nodes that have a service."""
-        offering = self._services.nodes(kind, self._limit(deadline))
+        offering = self._services.nodes(kind, deadline.at_most(_RESPONSE_S))
         return [node for node in nodes if node in offering and not is_hidden(node)]
-
-    def _limit(self, deadline: Deadline) -> Deadline:
-        return Deadline(min(_RESPONSE_S, deadline.left_s))

@@ -224,11 +224,9 @@ def publish(values: Values, _: Dashboard) -> Prepared:
     outgoing = read_outgoing(values)
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        from composer.client.session import Deadline as Limit
-
         outgoing.open(ros)
         try:
-            limit = Limit(min(_MATCHED_WITHIN_S, deadline.left_s))
+            limit = deadline.at_most(_MATCHED_WITHIN_S)
             expected = outgoing.expected()
             ros.session.wait_for(lambda: outgoing.subscriptions >= expected or None, limit)
             outgoing.publish()

@@ -182,7 +182,7 @@ def _receive(
     next_progress, last_count = Deadline(_PROGRESS_S), 0
     while not until.passed and recorder.problem is None:
         recording.update()
-        pause = Deadline(min(_UPDATE_S, until.left_s))
+        pause = until.at_most(_UPDATE_S)
         while not pause.passed:
             session.spin_once(pause)
         if next_progress.passed:

@@ -55,7 +55,7 @@ def check_discovery(session: Session, deadline: Deadline) -> CheckResult:
     name = f"_compose_doctor_{os.getpid()}"
     context = Context()
     context.init(list(ROS_ARGUMENTS))
-    limit = Deadline(min(_DISCOVERY_S, deadline.left_s))
+    limit = deadline.at_most(_DISCOVERY_S)
     started_s = time.monotonic()
     try:
         node = Node(name, context=context, use_global_arguments=False)

@@ -142,7 +142,7 @@ class Systems:
         """
         names = report.processes
         if not self._subscriptions.keys() >= set(names.values()):
-            self.reports(names.values(), Deadline(min(DISCOVERY_S, self._deadline.left_s)))
+            self.reports(names.values(), self._deadline.at_most(DISCOVERY_S))
         known = {process: name for process, name in names.items() if self._has_reported(name)}
         return with_processes(report, {key: self._report(name) for key, name in known.items()})
 
@@ -224,7 +224,7 @@ class Systems:
         limit = _ProcessDeadline(name, self._deadline)
         # A report proves that the process is alive: the services of a killed process remain in the
         # graph for a while.
-        discovery = _ProcessDeadline(name, Deadline(min(DISCOVERY_S, limit.left_s)))
+        discovery = _ProcessDeadline(name, limit.at_most(DISCOVERY_S))
         if not self._wait_for_reports((name,), discovery):
             raise self._no_response_error(name)
         full_name = f"{name}/{NAME}/{service}"

@@ -129,7 +129,7 @@ class NodeServices:
 
     def _wait_for_reports(self, deadline: Deadline) -> None:
         new = set(self._systems.discover()) - self._awaited  # wait for each manager only once
-        limit = Deadline(min(REPORT_WITHIN_S, deadline.left_s))
+        limit = deadline.at_most(REPORT_WITHIN_S)
 
         def have_reported() -> bool | None:
             reports = self._systems.current()

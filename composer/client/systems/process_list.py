@@ -37,7 +37,7 @@ def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> 
     """Return all systems and lifecycle nodes, once discovery is complete."""
     systems = Systems(session, deadline, callbacks=callbacks)
     client = LifecycleClient(session, deadline)
-    discovery = Deadline(min(DISCOVERY_S, deadline.left_s))
+    discovery = deadline.at_most(DISCOVERY_S)
     local = sorted(local_systems())
     systems.subscribe(local)
     names, nodes = session.wait_until_settled(
@@ -49,7 +49,7 @@ def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> 
         name: systems.other_version(name) for name, report in reports.items() if report is None
     }
     others = [node for node in nodes if node not in managed]
-    limited = LifecycleClient(session, Deadline(min(_RESPONSE_S, deadline.left_s)))
+    limited = LifecycleClient(session, deadline.at_most(_RESPONSE_S))
     whole = with_callbacks_of_processes({name: item for name, item in reports.items() if item})
     return ProcessList({**reports, **whole, **unread}, limited.states(others) if others else {})
 
@@ -58,7 +58,7 @@ def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool
     """Return one system. Raises NotFoundError, NoResponseError."""
     systems = Systems(session, deadline, callbacks=callbacks)
     found = systems.find(name)
-    discovery = Deadline(min(DISCOVERY_S, deadline.left_s))
+    discovery = deadline.at_most(DISCOVERY_S)
     report = systems.reports([found], discovery)[found]
     if report is None:
         error = systems.other_version(found)
@@ -104,7 +104,7 @@ def find_managed_nodes(
         *local_systems(),
     }
     names = without_members(names)  # the others move their nodes for one of these
-    reports = systems.reports(names, Deadline(min(REPORT_WITHIN_S, deadline.left_s)))
+    reports = systems.reports(names, deadline.at_most(REPORT_WITHIN_S))
     system_of = {
         node.node: name for name, report in reports.items() if report for node in report.nodes
     }
