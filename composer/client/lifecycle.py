@@ -18,11 +18,9 @@ from rclpy.type_support import check_is_valid_srv_type
 from composer.base.fast_dataclass import dataclass
 from composer.client.graph_names import check_all_respond, find_node, not_found_error
 from composer.client.session import Deadline, NoResponseError, RosError, Session
-from composer.client.systems.managers import REPORT_WITHIN_S, Systems
 from composer.client.systems.node_services import NodeServices
 from composer.model.lifecycle import PRIMARY_STATES, TRANSITIONS, next_transition
 from composer.model.names import is_pattern, is_selected
-from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.reports import NodeReport, SystemReport
 
 _RANK = {"finalized": -1, "unconfigured": 0, "inactive": 1, "active": 2}
@@ -176,6 +174,10 @@ class LifecycleClient:
         """Return the full names of the lifecycle nodes discovered so far."""
         return tuple(sorted(self._services.nodes(GetState, self._deadline)))
 
+    def reports(self) -> dict[str, SystemReport | None]:
+        """Return the reports of the known systems, None for those that do not respond."""
+        return self._services.reports(self._deadline)
+
     def close(self) -> None:
         """Destroy clients and subscriptions; the end of the session does so too."""
         self._services.close()
@@ -225,17 +227,13 @@ class LifecycleBatch:
     """
 
     def __init__(
-        self,
-        session: Session,
-        deadline: Deadline,
-        targets: Iterable[str],
-        request: LifecycleRequest,
+        self, client: LifecycleClient, targets: Iterable[str], request: LifecycleRequest
     ) -> None:
         """Find the nodes. Raises NotFoundError, NoResponseError."""
-        self._client = LifecycleClient(session, deadline)
+        self._client = client
         self._request = request
-        self._nodes = self._client.select(targets)
-        reports = _system_reports(session, deadline)
+        self._nodes = client.select(targets)
+        reports = client.reports()
         #: Systems whose dependencies are unknown, because their managers do not respond.
         self.silent_systems = [name for name, report in reports.items() if report is None]
         self.active_dependents: tuple[str, ...] = ()
@@ -285,13 +283,6 @@ def _outcome(change: Callable[[], CompletedTransition]) -> NodeOutcome:
         return change()
     except RosError as error:
         return error
-
-
-def _system_reports(session: Session, deadline: Deadline) -> dict[str, SystemReport | None]:
-    """Return the reports of the known systems, None for those that do not respond."""
-    systems = Systems(session, deadline)
-    limit = deadline.at_most(REPORT_WITHIN_S)
-    return systems.reports({*systems.discover(), *local_systems()}, limit)
 
 
 def lowered(nodes: Iterable[NodeReport], goals: Mapping[str, str]) -> dict[str, str]:

@@ -119,11 +119,11 @@ def transition(values: Values, _: Dashboard) -> Prepared:
     dependents = values.flag("dependents")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        from composer.client.lifecycle import LifecycleBatch, LifecycleRequest
+        from composer.client.lifecycle import LifecycleBatch, LifecycleClient, LifecycleRequest
 
-        batch = LifecycleBatch(ros.session, deadline, [name], LifecycleRequest(label, None))
-        outcomes = batch.run(dependents=dependents)
-        return {"outcomes": _completed(ros, outcomes)}
+        with closing(LifecycleClient(ros.session, deadline)) as client:
+            batch = LifecycleBatch(client, [name], LifecycleRequest(label, None))
+            return {"outcomes": _completed(ros, batch.run(dependents=dependents))}
 
     return run, _CHANGE_S
 
@@ -133,16 +133,17 @@ def restart(values: Values, _: Dashboard) -> Prepared:
     name = values.text("node")
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        from composer.client.lifecycle import LifecycleBatch, LifecycleRequest
+        from composer.client.lifecycle import LifecycleBatch, LifecycleClient, LifecycleRequest
 
         message = _restart_by_manager(ros, deadline, name)
         if message is not None:
             return {"outcomes": [], "message": message}
         outcomes: list[dict[str, Any]] = []
         for state in ("unconfigured", "active"):
-            request = LifecycleRequest(None, state)
-            batch = LifecycleBatch(ros.session, deadline, [name], request)
-            outcomes += _completed(ros, batch.run(dependents=True))
+            # Each with new reports: which nodes depend on this one is decided by their states.
+            with closing(LifecycleClient(ros.session, deadline)) as client:
+                batch = LifecycleBatch(client, [name], LifecycleRequest(None, state))
+                outcomes += _completed(ros, batch.run(dependents=True))
         return {"outcomes": outcomes, "message": ""}
 
     return run, _RESTART_S

@@ -177,11 +177,11 @@ def set_state(
     """
     targets, transition = _split(list(words or ()), to)
     with ros_session("compose lifecycle set", timeout) as (session, deadline):
-        from composer.client.lifecycle import LifecycleBatch, LifecycleRequest
+        from composer.client.lifecycle import LifecycleBatch, LifecycleClient, LifecycleRequest
         from composer.client.session import RosError
 
         request = LifecycleRequest(transition, None if to is None else to.value)
-        batch = LifecycleBatch(session, deadline, targets, request)
+        batch = LifecycleBatch(LifecycleClient(session, deadline), targets, request)
         _check_dependents(batch, dependents=dependents)
         failed = False
         for outcome in batch.run(dependents=dependents):

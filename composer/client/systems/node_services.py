@@ -18,7 +18,9 @@ from composer.client.requests import ServiceCaller, required, type_of
 from composer.client.session import Deadline, Session
 from composer.client.systems.local_queries import nodes_with
 from composer.client.systems.managers import REPORT_WITHIN_S, Systems
+from composer.runtime.process.instance_lock import local_systems
 from composer.runtime.protocol.codec import ProtocolError
+from composer.runtime.protocol.reports import SystemReport
 from composer.runtime.protocol.requests import NAME, REQUEST, CallNodes, NodeCall
 from composer.runtime.ros.graph import is_valid_name
 from composer.runtime.ros.messages import MessageError, convert_message, to_plain
@@ -126,6 +128,11 @@ class NodeServices:
             node: None if response is None else str(response.current_state.label)
             for node, response in responses.items()
         }
+
+    def reports(self, deadline: Deadline) -> dict[str, SystemReport | None]:
+        """Return the reports of the known systems, None for those that do not respond."""
+        names = {*self._systems.discover(), *local_systems()}
+        return self._systems.reports(names, deadline.at_most(REPORT_WITHIN_S))
 
     def _wait_for_reports(self, deadline: Deadline) -> None:
         new = set(self._systems.discover()) - self._awaited  # wait for each manager only once
