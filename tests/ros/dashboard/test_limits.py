@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
 import pytest
+from rclpy.lifecycle import LifecycleNode
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -23,7 +24,7 @@ from tests.ros.support.dashboard import (
     close_code,
     dashboard,
 )
-from tests.ros.support.in_process import wait_until
+from tests.ros.support.in_process import Peer, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +95,17 @@ def test_half_open_and_many_connections(server: Dashboard, page: Browser) -> Non
     wait_until(lambda: server.open_files() <= before + 5, "the files of the ended connections")
     with browser(address) as other:
         assert other.ok("ping")
+
+
+def test_nothing_is_left_of_a_transition(page: Browser, peer: Peer) -> None:
+    name = peer.join("managed", LifecycleNode).get_fully_qualified_name()
+    service = f"{name}/change_state"
+    known = {"name": name, "state": "unconfigured"}
+    nodes = page.subscribe("nodes")
+    page.until(nodes, lambda data: any(known.items() <= node.items() for node in data["nodes"]))
+    for transition in ("configure", "activate"):
+        page.ok("transition", node=name, transition=transition)
+        wait_until(lambda: not peer.node.count_clients(service), "the end of the client")
 
 
 @pytest.mark.usefixtures("incomplete")
