@@ -145,8 +145,8 @@ def _live(timeout_s: float, measure_s: float, *, has_processes: bool) -> Scene:
         with GraphObserver(session) as observer:
             snapshot = observer.snapshot(deadline)
             if has_processes:
-                listed = list_processes(session, deadline, callbacks=False).systems
-                snapshot = replace(snapshot, processes=observed_processes(listed))
+                reports, _ = list_processes(session, deadline, callbacks=False)
+                snapshot = replace(snapshot, processes=observed_processes(reports))
             return live_scene_of(snapshot, observer.rates(deadline, measure_s))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ from composer.cli.support.system_arguments import AnyRunningSystem, running_syst
 from composer.cli.support.terminal import as_json, columns, lines, write
 
 if TYPE_CHECKING:
+    from composer.client.systems.process_list import Processes, Reports
     from composer.runtime.protocol.codec import OtherVersionError
     from composer.runtime.protocol.reports import NodeReport, SystemReport
 
@@ -25,12 +26,6 @@ EPILOG = examples(
     "compose ps pipeline --ready    check that all of its nodes are up, as containers do",
     "compose ps --json              print JSON",
 )
-
-#: None stands for a system that did not respond.
-_Systems: TypeAlias = "Mapping[str, SystemReport | OtherVersionError | None]"
-#: The reports of systems by their names, and the states of other lifecycle nodes. None stands for a
-#: node that did not respond.
-_Listed: TypeAlias = "tuple[_Systems, Mapping[str, str | None]]"
 
 _HEAD = ("node", "state", "since", "restarts", "errors", "out Hz", "in Hz", "last error")
 _PROCESS = "process"
@@ -67,7 +62,7 @@ def ps(
         raise typer.Exit(FAILED)
 
 
-def _ask(name: str | None, timeout: float, *, callbacks: bool) -> _Listed | None:
+def _ask(name: str | None, timeout: float, *, callbacks: bool) -> Processes | None:
     """Return what runs if the systems on this computer know that."""
     require_ros("compose ps")
     from composer.client.systems.local_queries import local_report, local_reports
@@ -79,22 +74,20 @@ def _ask(name: str | None, timeout: float, *, callbacks: bool) -> _Listed | None
     return None if report is None else ({report.name: report}, {})
 
 
-def _discover(name: str | None, timeout: float, *, callbacks: bool) -> _Listed:
+def _discover(name: str | None, timeout: float, *, callbacks: bool) -> Processes:
     with ros_session("compose ps", timeout) as (session, deadline):
         from composer.client.systems.process_list import list_one, list_processes
 
         if name is None:
-            listed = list_processes(session, deadline, callbacks=callbacks)
-        else:
-            listed = list_one(session, deadline, name, callbacks=callbacks)
-    return listed.systems, listed.others
+            return list_processes(session, deadline, callbacks=callbacks)
+        return list_one(session, deadline, name, callbacks=callbacks)
 
 
-def _as_json(systems: _Systems, others: Mapping[str, str | None]) -> str:
+def _as_json(reports: Reports, others: Mapping[str, str | None]) -> str:
     content: dict[str, Any] = {
         "systems": [
             {"name": name} | ({"answered": False} if report is None else _report(report))
-            for name, report in systems.items()
+            for name, report in reports.items()
         ],
         "nodes": [{"node": node, "state": state} for node, state in others.items()],
     }
@@ -118,13 +111,13 @@ def _report(report: SystemReport | OtherVersionError) -> dict[str, Any]:
     return content
 
 
-def _as_text(systems: _Systems, others: Mapping[str, str | None]) -> str:
+def _as_text(reports: Reports, others: Mapping[str, str | None]) -> str:
     from composer.runtime.protocol.reports import SystemReport
 
-    known = [report for report in systems.values() if isinstance(report, SystemReport)]
+    known = [report for report in reports.values() if isinstance(report, SystemReport)]
     processes = {name for report in known for name in report.processes.values()}
     parts = [
-        system_text(name, report, is_listed=name in processes) for name, report in systems.items()
+        system_text(name, report, is_listed=name in processes) for name, report in reports.items()
     ]
     if others:
         rows = [(node, state or "(no response)") for node, state in others.items()]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from typing import TypeAlias
 
-from composer.base.fast_dataclass import dataclass
+from lifecycle_msgs.srv import GetState
+
 from composer.client.graph_names import NotFoundError, not_found_error
-from composer.client.lifecycle import LifecycleClient
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.local_queries import with_callbacks_of_processes
 from composer.client.systems.managers import DISCOVERY_S, REPORT_WITHIN_S, Systems, without_members
+from composer.client.systems.node_services import NodeServices
 from composer.model.names import is_pattern, is_selected
 from composer.plan.drift import ObservedProcess
 from composer.runtime.process.instance_lock import local_systems
@@ -22,39 +23,34 @@ from composer.runtime.protocol.requests import NAME
 _RESPONSE_S = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessList:
-    """Systems by the namespaces of their managers, and the states of other lifecycle nodes.
-
-    An error stands for a system of another version, None for a system or node that did not respond.
-    """
-
-    systems: dict[str, SystemReport | OtherVersionError | None]
-    others: dict[str, str | None] = field(default_factory=dict)
+#: The reports of systems by the namespaces of their managers. An error stands for a system of
+#: another version, None for a system that did not respond.
+Reports: TypeAlias = Mapping[str, SystemReport | OtherVersionError | None]
+#: The reports, and the states of other lifecycle nodes: None for a node that did not respond.
+Processes: TypeAlias = tuple[Reports, Mapping[str, str | None]]
 
 
-def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> ProcessList:
+def list_processes(session: Session, deadline: Deadline, *, callbacks: bool) -> Processes:
     """Return all systems and lifecycle nodes, once discovery is complete."""
     systems = Systems(session, deadline, callbacks=callbacks)
-    client = LifecycleClient(session, deadline)
+    services = NodeServices(session)
     discovery = deadline.at_most(DISCOVERY_S)
     local = sorted(local_systems())
     systems.subscribe(local)
     names, nodes = session.wait_until_settled(
-        lambda: (systems.discover(), client.known()), deadline
+        lambda: (systems.discover(), services.nodes(GetState, deadline)), deadline
     )
     reports = systems.reports({*local, *names}, discovery)
     managed = {node.node for report in reports.values() if report for node in report.nodes}
     unread = {
         name: systems.other_version(name) for name, report in reports.items() if report is None
     }
-    others = [node for node in nodes if node not in managed]
-    limited = LifecycleClient(session, deadline.at_most(_RESPONSE_S))
+    states = services.states(sorted(nodes - managed), deadline.at_most(_RESPONSE_S))
     whole = with_callbacks_of_processes({name: item for name, item in reports.items() if item})
-    return ProcessList({**reports, **whole, **unread}, limited.states(others) if others else {})
+    return {**reports, **whole, **unread}, states
 
 
-def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> ProcessList:
+def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool) -> Processes:
     """Return one system. Raises NotFoundError, NoResponseError."""
     systems = Systems(session, deadline, callbacks=callbacks)
     found = systems.find(name)
@@ -63,14 +59,12 @@ def list_one(session: Session, deadline: Deadline, name: str, *, callbacks: bool
     if report is None:
         error = systems.other_version(found)
         if error is not None:
-            return ProcessList({found: error})
+            return {found: error}, {}
         report = systems.report(found)
-    return ProcessList({found: systems.whole(report) if callbacks else report})
+    return {found: systems.whole(report) if callbacks else report}, {}
 
 
-def observed_processes(
-    reports: Mapping[str, SystemReport | OtherVersionError | None],
-) -> tuple[ObservedProcess, ...]:
+def observed_processes(reports: Reports) -> tuple[ObservedProcess, ...]:
     """Return the processes of systems, with their nodes and managers, by the reports of all."""
     known = {name: report for name, report in reports.items() if isinstance(report, SystemReport)}
     nodes: dict[str, dict[str, None]] = {}
