@@ -81,11 +81,11 @@ def check_workspaces(hosts: list[Host]) -> None:
 @contextmanager
 def reported_problems() -> Iterator[None]:
     """Print what is wrong with hosts, and end the command."""
-    from composer.client.hosts.start import HostsDiffer
+    from composer.client.hosts.connection import HostsError
 
     try:
         yield
-    except HostsDiffer as error:
+    except HostsError as error:
         for text, hint in error.problems:
             say(CommandError(text, hint=hint).text())
         raise typer.Exit(FAILED) from error

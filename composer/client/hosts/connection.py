@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import asyncssh
 
@@ -30,15 +31,26 @@ MOST_OUTPUT = 4_000_000
 _LONGEST_REASON = 500
 
 
-class HostError(Exception):
-    """A host cannot be used; the text says why, and ``hint`` what to do.
+#: Why a host cannot be used, and what to do.
+Problem: TypeAlias = tuple[str, str | None]
+
+
+class HostsError(Exception):
+    """Hosts cannot be used: a message and a hint each."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        super().__init__("\n".join(text for text, _ in problems))
+        self.problems = tuple(problems)
+
+
+class HostError(HostsError):
+    """A host cannot be used; the text says why, and the hint what to do.
 
     The text is one line, though a host has sent parts of it.
     """
 
     def __init__(self, host: Host, reason: str, hint: str | None = None) -> None:
-        super().__init__(f"{host.name} ({host.login}): {shown(reason)}")
-        self.hint = hint
+        super().__init__([(f"{host.name} ({host.login}): {shown(reason)}", hint)])
 
 
 class Output(NamedTuple):

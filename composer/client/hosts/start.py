@@ -15,6 +15,8 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile
 from composer.client.hosts.connection import (
     HostError,
+    HostsError,
+    Problem,
     connect,
     failure_of,
     load_keys,
@@ -100,18 +102,10 @@ def _unlike(
             yield name, ours, theirs
 
 
-class HostsDiffer(Exception):
-    """Hosts cannot be used: a message and a hint each."""
-
-    def __init__(self, problems: Sequence[tuple[str, str | None]]) -> None:
-        super().__init__("\n".join(text for text, _ in problems))
-        self.problems = tuple(problems)
-
-
 async def connect_all(
     hosts: Sequence[Host], root: Path, stack: AsyncExitStack
 ) -> Mapping[str, asyncssh.SSHClientConnection]:
-    """Connect to all hosts at once, until ``stack`` ends. Raises HostsDiffer with all errors."""
+    """Connect to all hosts at once, until ``stack`` ends. Raises HostsError with all errors."""
 
     async def attempt(host: Host) -> asyncssh.SSHClientConnection:
         load_keys(host, root)
@@ -134,9 +128,9 @@ async def compare_all(
     question: Question,
     here: Inventory,
 ) -> None:
-    """Compare the inventories of all hosts with this computer's. Raises HostsDiffer."""
+    """Compare the inventories of all hosts with this computer's. Raises HostsError."""
 
-    async def compare(host: Host) -> list[tuple[str, str | None]]:
+    async def compare(host: Host) -> list[Problem]:
         there = await _ask(host, connections[host.name.value], question)
         return _described(host, here, there)
 
@@ -144,7 +138,7 @@ async def compare_all(
     _raise_problems(results)
     found = [item for result in results if isinstance(result, list) for item in result]
     if found:
-        raise HostsDiffer(found)
+        raise HostsError(found)
 
 
 async def _ask(
@@ -165,9 +159,9 @@ async def _ask(
         ) from error
 
 
-def _described(host: Host, here: Inventory, there: Inventory) -> list[tuple[str, str | None]]:
+def _described(host: Host, here: Inventory, there: Inventory) -> list[Problem]:
     found = differences(here, there)
-    described: list[tuple[str, str | None]] = []
+    described: list[Problem] = []
     for kind in Kind:
         texts = [shown(item.text) for item in found if item.kind is kind]
         lines = [f"{host.name} ({host.login}): {text}" for text in texts]
@@ -180,14 +174,14 @@ def _described(host: Host, here: Inventory, there: Inventory) -> list[tuple[str,
 
 
 def _raise_problems(results: Sequence[object]) -> None:
-    problems: list[tuple[str, str | None]] = []
+    problems: list[Problem] = []
     for result in results:
         if isinstance(result, HostError):
-            problems.append((str(result), result.hint))
+            problems += result.problems
         elif isinstance(result, BaseException):
             raise result
     if problems:
-        raise HostsDiffer(problems)
+        raise HostsError(problems)
 
 
 def question_about(system: System, path: Path, project: Project) -> Question:
@@ -273,7 +267,7 @@ def run_on_hosts(
 ) -> int:
     """Compare all hosts, start everything, and return the exit code of the system at its end.
 
-    Raises HostsDiffer.
+    Raises HostsError.
     """
 
     async def run() -> int:
@@ -286,10 +280,7 @@ def run_on_hosts(
             loop = asyncio.get_running_loop()
             for number in STOP_SIGNALS:
                 loop.add_signal_handler(number, deployment.end)
-            try:
-                return await deployment.run(connections)
-            except HostError as error:
-                raise HostsDiffer([(str(error), error.hint)]) from error
+            return await deployment.run(connections)
 
     return asyncio.run(run())
 
@@ -299,22 +290,17 @@ def sync_hosts(
 ) -> None:
     """Copy the project to all hosts, one after the other; nothing if one of them is not ready.
 
-    Raises HostsDiffer.
+    Raises HostsError.
     """
 
     async def run() -> None:
         async with AsyncExitStack() as stack:
             connections = await connect_all(hosts, options.root, stack)
-            try:
-                targets = [
-                    await prepare_workspace(
-                        host, connections[host.name.value], dry_run=options.dry_run
-                    )
-                    for host in hosts
-                ]
-                for host, target in zip(hosts, targets, strict=True):
-                    report(host, await asyncio.to_thread(copy_project, host, target, options))
-            except HostError as error:
-                raise HostsDiffer([(str(error), error.hint)]) from error
+            targets = [
+                await prepare_workspace(host, connections[host.name.value], dry_run=options.dry_run)
+                for host in hosts
+            ]
+            for host, target in zip(hosts, targets, strict=True):
+                report(host, await asyncio.to_thread(copy_project, host, target, options))
 
     asyncio.run(run())

@@ -21,10 +21,10 @@ from tests.unit.support.hosts import SPAN, host, located
 asyncssh = pytest.importorskip("asyncssh", reason="asyncssh is not installed")
 from composer.client.hosts import connection as host_connection  # noqa: E402
 from composer.client.hosts import sync  # noqa: E402
-from composer.client.hosts.connection import HostError  # noqa: E402
+from composer.client.hosts.connection import HostError, HostsError  # noqa: E402
 from composer.client.hosts.deployment import Deployment, DeploymentOptions, RemoteProcess  # noqa: E402
 from composer.client.hosts.inventory import Inventory, Question  # noqa: E402
-from composer.client.hosts.start import HostsDiffer, compare_all, connect_all  # noqa: E402
+from composer.client.hosts.start import compare_all, connect_all  # noqa: E402
 
 EVIL = "\x1b[2J\x07evil\u202e\r\n[FATAL] [compose] forged "
 HERE = Inventory("3.11", {"numpy": "2.0"}, {}, {"a.yaml": "00"})
@@ -110,7 +110,7 @@ def test_what_a_host_answers(
     answer: Any, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(host_connection, "MOST_OUTPUT", 1_000_000)
-    with pytest.raises(HostsDiffer) as refusal:
+    with pytest.raises(HostsError) as refusal:
         asyncio.run(serve(tmp_path, answer, compare))
     problems = [text for text, _ in refusal.value.problems]
     assert any(expected in text for text in problems), problems
@@ -233,4 +233,5 @@ def test_a_refused_session_and_a_defect_end_everything(
     with pytest.raises(kind, match=text) as raised:
         asyncio.run(deployment(tmp_path).run({"jetson": connection}))
     if isinstance(raised.value, HostError):
-        assert "MaxSessions" in str(raised.value.hint)
+        ((_, hint),) = raised.value.problems
+        assert "MaxSessions" in str(hint)
