@@ -10,7 +10,8 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
@@ -29,8 +30,8 @@ _PACKAGES = ("ros2-composer", "rclpy")
 class Question:
     """The files, relative to the root of the project, and the interfaces that a system uses."""
 
-    files: tuple[str, ...]
-    interfaces: tuple[str, ...]
+    files: Sequence[str]
+    interfaces: Sequence[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ def take_inventory(root: Path, question: Question) -> Inventory:
 
 def written_question(question: Question) -> str:
     """Return a question as a line of JSON."""
-    return json.dumps({"files": question.files, "interfaces": question.interfaces}) + "\n"
+    return f"{json.dumps(asdict(question))}\n"
 
 
 def read_answer(text: str) -> Inventory:
@@ -116,16 +117,9 @@ def _digest(path: Path) -> str | None:
 
 
 def _main() -> None:
-    asked = json.loads(sys.stdin.readline())
-    question = Question(tuple(asked["files"]), tuple(asked["interfaces"]))
+    question = Question(**json.loads(sys.stdin.readline()))
     found = take_inventory(Path.cwd(), question)
-    answer = {
-        "python": found.python,
-        "packages": found.packages,
-        "interfaces": found.interfaces,
-        "files": found.files,
-    }
-    sys.stdout.write(f"\n{json.dumps(answer)}\n")
+    sys.stdout.write(f"\n{json.dumps(asdict(found))}\n")
 
 
 if __name__ == "__main__":
