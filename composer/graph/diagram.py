@@ -159,6 +159,16 @@ class Graph:
     edges: tuple[Edge, ...]
     clusters: tuple[Cluster, ...] = ()
 
+    @property
+    def blocks(self) -> tuple[Cluster, ...]:
+        """The nodes that are drawn with their ports."""
+        return tuple(cluster for cluster in self.clusters if cluster.block)
+
+    @property
+    def things(self) -> tuple[Cluster | Vertex | Edge, ...]:
+        """Everything with details: blocks, vertices and edges."""
+        return (*self.blocks, *self.vertices, *self.edges)
+
 
 class Namespaces:
     """The namespaces of nodes. A namespace with only one child and no nodes is not drawn."""

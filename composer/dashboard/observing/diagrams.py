@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import Any
 
@@ -61,7 +61,7 @@ class Diagram:
         directions = tuple(Direction) if view in _TURNED else (graph.direction,)
         self._graph = graph
         self._layout_on = arrange_for_pages(graph, directions)
-        self._facts = {thing.key: _facts(thing) for thing in _things(graph)}
+        self._facts = {thing.key: _facts(thing) for thing in graph.things}
         self._executors = _nodes_by_executor(graph) if view is View.DEPLOYMENT else {}
 
     def on(self, page: Size) -> dict[str, Any]:
@@ -96,12 +96,6 @@ def _nodes_by_executor(graph: Graph) -> dict[str, list[str]]:
     for vertex in graph.vertices:
         found.setdefault(vertex.cluster, []).append(vertex.key.removeprefix(_NODE))
     return found
-
-
-def _things(graph: Graph) -> Iterable[Cluster | Vertex | Edge]:
-    yield from (cluster for cluster in graph.clusters if cluster.block)
-    yield from graph.vertices
-    yield from graph.edges
 
 
 def _facts(thing: Cluster | Vertex | Edge) -> dict[str, Any]:

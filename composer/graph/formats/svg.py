@@ -58,7 +58,7 @@ def _lines(graph: Graph, layout: Layout) -> Iterator[str]:
 
 def contents(graph: Graph, layout: Layout) -> Iterator[str]:
     """Yield everything that is drawn, back to front."""
-    blocks = {cluster.key for cluster in graph.clusters if cluster.block}
+    blocks = {block.key for block in graph.blocks}
     for item in layout.frames:
         if not item.cluster.block:
             yield from _frame(item)

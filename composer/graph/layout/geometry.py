@@ -179,9 +179,9 @@ def _blocks(graph: Graph) -> Iterator[tuple[str, tuple[Cluster, list[Vertex]]]]:
     ports: dict[str, list[Vertex]] = {}
     for vertex in graph.vertices:
         ports.setdefault(vertex.cluster, []).append(vertex)
-    for cluster in graph.clusters:
-        if cluster.block and cluster.key in ports:
-            yield cluster.key, (cluster, ports[cluster.key])
+    for block in graph.blocks:
+        if block.key in ports:
+            yield block.key, (block, ports[block.key])
 
 
 def _vertex_size(vertex: Vertex) -> Size:

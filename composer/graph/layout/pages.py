@@ -207,7 +207,7 @@ def _has_parts(graph: Graph) -> bool:
 
 def _parts(graph: Graph) -> tuple[list[Graph], list[Edge]]:
     """Return what is in each outermost frame and in none, and the edges between these parts."""
-    blocks = {cluster.key for cluster in graph.clusters if cluster.block}
+    blocks = {block.key for block in graph.blocks}
     # Blocks without a frame around them stay together.
     around = {key: "" if frame in blocks else frame for key, frame in _outermost(graph).items()}
     part_of = {vertex.key: around.get(vertex.cluster, "") for vertex in graph.vertices}

@@ -57,20 +57,10 @@ def articles(graphs: Iterable[Graph]) -> Iterator[str]:
     """Yield an article for everything in the graphs that has facts or diagnostics, each once."""
     seen: set[str] = set()
     for graph in graphs:
-        for key, details, problem in _things(graph):
-            if key not in seen and (details or problem):
-                seen.add(key)
-                yield _article(key, details, problem)
-
-
-def _things(graph: Graph) -> Iterator[tuple[str, Details, Problem | None]]:
-    for cluster in graph.clusters:
-        if cluster.block:
-            yield cluster.key, cluster.details, cluster.problem
-    for vertex in graph.vertices:
-        yield vertex.key, vertex.details, vertex.problem
-    for edge in graph.edges:
-        yield edge.key, edge.details, edge.problem
+        for thing in graph.things:
+            if thing.key not in seen and (thing.details or thing.problem):
+                seen.add(thing.key)
+                yield _article(thing.key, thing.details, thing.problem)
 
 
 def _article(key: str, details: Details, problem: Problem | None) -> str:
@@ -238,7 +228,7 @@ def _tabs(views: Sequence[str], shown: int) -> Iterator[str]:
 
 def _filters(graphs: Sequence[Graph]) -> Iterator[str]:
     vertices = [vertex for graph in graphs for vertex in graph.vertices]
-    blocks = [cluster for graph in graphs for cluster in graph.clusters if cluster.block]
+    blocks = [block for graph in graphs for block in graph.blocks]
     kinds = {vertex.kind for vertex in vertices} | ({VertexKind.NODE} if blocks else set())
     namespaces = {vertex.namespace for vertex in vertices if vertex.kind is VertexKind.NODE}
     namespaces |= {block.namespace for block in blocks}
