@@ -18,6 +18,7 @@ from composer.interfaces.parser import (
     split_name,
 )
 from composer.interfaces.sources import (
+    FOLDERS,
     Bundle,
     Definition,
     InterfaceSource,
@@ -171,12 +172,16 @@ class Interfaces:
             self._packages = frozenset().union(*(source.packages() for source in self._sources))
         return self._packages
 
-    def names(self, folder: str) -> tuple[str, ...]:
-        """Return the names of all interfaces in ``folder`` (msg, srv or action), sorted."""
-        if folder not in self._names:
-            names = {name for source in self._sources for name in source.names(folder)}
-            self._names[folder] = tuple(sorted(names))
-        return self._names[folder]
+    def names(self, *folders: str) -> tuple[str, ...]:
+        """Return the names of all interfaces in folders (msg, srv, action; default: all), sorted.
+
+        Those of a folder come before those of the next one.
+        """
+        for folder in folders or FOLDERS:
+            if folder not in self._names:
+                names = {name for source in self._sources for name in source.names(folder)}
+                self._names[folder] = tuple(sorted(names))
+        return tuple(name for folder in folders or FOLDERS for name in self._names[folder])
 
     def _look_up(self, name: str) -> Interface | InvalidDefinition | None:
         if name not in self._found:

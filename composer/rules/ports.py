@@ -9,7 +9,6 @@ from composer.base.fast_dataclass import dataclass
 from composer.base.source import shown_path
 from composer.interfaces import Interfaces, InvalidDefinition
 from composer.interfaces.index import similar_interface
-from composer.interfaces.sources import FOLDERS
 from composer.model import Chain, ChannelKind, Connection, Endpoint, Port, PortKind
 from composer.model.interface_packages import how_to_build
 from composer.rules.analysis.context import KINDS_OF_INTERFACES, Context, is_unresolved
@@ -60,14 +59,11 @@ def _invalid_definition(context: Context, port: Port, problem: InvalidDefinition
 
 def invalid_definitions(interfaces: Interfaces, packages: Collection[str]) -> Iterator[Diagnostic]:
     """Check all definitions of some packages of a project, whether a system uses them or not."""
-    for folder in FOLDERS:
-        for name in interfaces.names(folder):
-            if name.partition("/")[0] in packages and interfaces.find(name) is None:
-                problem = interfaces.problem(name)
-                if problem is not None:
-                    yield Diagnostic(
-                        UNKNOWN_INTERFACE, str(problem), problem.span, hint=problem.hint
-                    )
+    for name in interfaces.names():
+        if name.partition("/")[0] in packages and interfaces.find(name) is None:
+            problem = interfaces.problem(name)
+            if problem is not None:
+                yield Diagnostic(UNKNOWN_INTERFACE, str(problem), problem.span, hint=problem.hint)
 
 
 def _type_word(kind: ChannelKind) -> str:

@@ -243,8 +243,7 @@ def _known_types() -> set[str]:
     from composer.project import Project
     from composer.project.node_types import interface_folders
 
-    types = Interfaces.load(interface_folders(Project.at(Path.cwd())))
-    return {name for kind in ("msg", "srv", "action") for name in types.names(kind)}
+    return {*Interfaces.load(interface_folders(Project.at(Path.cwd()))).names()}
 
 
 def _report_left_out(left_out: tuple[str, ...]) -> None:

@@ -48,7 +48,7 @@ def list_interfaces(
     """List all types, or the types of a package."""
     from composer.base.diagnostics import suggestion
 
-    names = _names(_interfaces())
+    names = list(_interfaces().names())
     packages = {name.partition("/")[0] for name in names}
     if package is not None and package not in packages:
         raise CommandError(
@@ -201,10 +201,6 @@ def _interfaces() -> Interfaces:
     return Interfaces.load(interface_folders(Project.at(Path.cwd())))
 
 
-def _names(interfaces: Interfaces) -> list[str]:
-    return [name for folder in ("msg", "srv", "action") for name in interfaces.names(folder)]
-
-
 def _find(interfaces: Interfaces, name: str) -> Interface:
     """Return an interface. Raises CommandError."""
     from composer.interfaces.index import similar_interface
@@ -215,7 +211,7 @@ def _find(interfaces: Interfaces, name: str) -> Interface:
         raise CommandError(str(problem), hint=f"see {problem.place}")
     if found is None:
         raise CommandError(
-            f"there is no type '{name}'", hint=similar_interface(name, _names(interfaces))
+            f"there is no type '{name}'", hint=similar_interface(name, interfaces.names())
         )
     return found
 

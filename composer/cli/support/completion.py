@@ -98,16 +98,13 @@ def _complete_graph(kind: str) -> Complete:
 
 
 def _complete_types(*folders: str) -> Complete:
-    """Return a function that completes types of these kinds: ``msg``, ``srv``, ``action``."""
+    """Return a function that completes types of these kinds; all by default."""
 
     @silent
     def complete(incomplete: str) -> list[str]:
         from composer.interfaces import Interfaces
 
-        interfaces = Interfaces.load()
-        return _starting_with(
-            incomplete, [name for folder in folders for name in interfaces.names(folder)]
-        )
+        return _starting_with(incomplete, Interfaces.load().names(*folders))
 
     return complete
 
@@ -116,4 +113,4 @@ complete_topic = _complete_graph("topic")
 complete_service = _complete_graph("service")
 complete_action = _complete_graph("action")
 complete_message_type = _complete_types("msg")
-complete_type = _complete_types("msg", "srv", "action")
+complete_type = _complete_types()

@@ -30,7 +30,6 @@ _ROS_DISTRIBUTION = "jazzy"
 #: See https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html
 _SAFE_DOMAIN_IDS = (range(102), range(215, 233))
 _PROFILE_VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
-_INTERFACE_KINDS = ("msg", "srv", "action")
 
 
 def check_versions() -> Iterator[CheckResult]:
@@ -198,7 +197,6 @@ def check_interfaces(
 def _changed(package: str, sources: Interfaces, built: Interfaces) -> list[str]:
     return [
         name
-        for kind in _INTERFACE_KINDS
-        for name in sources.names(kind)
+        for name in sources.names()
         if name.startswith(f"{package}/") and sources.find(name) != built.find(name)
     ]

@@ -15,7 +15,6 @@ from pathlib import Path
 from composer.base.fast_dataclass import dataclass
 from composer.base.source import SourceFile
 from composer.interfaces import Interfaces
-from composer.interfaces.sources import FOLDERS
 from composer.model import Node
 from composer.python_code.lookup import BehaviorSource, BrokenModule
 from composer.python_code.stubs.behaviors import behavior_class_name, behavior_module, message_stubs
@@ -106,7 +105,7 @@ class FileSet:
         uses_rclpy = "rclpy" in words or any("self.node" in text for text in texts)
         names = {port.interface.value for node in self.behaviors.values() for port in node.ports}
         names.update(_API_MESSAGES)
-        for name in (name for folder in FOLDERS for name in interfaces.names(folder)):
+        for name in interfaces.names():
             package, _, short = name.split("/")
             if {package, short} <= words or (uses_rclpy and package in _RCLPY_PACKAGES):
                 names.add(name)

@@ -117,7 +117,7 @@ class Imports:
 
     def _home(self, package: str, folder: str, name: str) -> str | None:
         """Return the only module that has an interface: in a package, or any."""
-        listed = (item.split("/") for each in FOLDERS for item in self.interfaces.names(each))
+        listed = (item.split("/") for item in self.interfaces.names())
         homes = [item[:2] for item in listed if item[2] == name]
         own = [home for home in homes if home[0] == package]
         homes = own or [home for home in homes if home[1] == folder]

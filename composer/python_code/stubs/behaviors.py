@@ -27,7 +27,6 @@ from composer.interfaces import (
     Service,
     parts,
 )
-from composer.interfaces.sources import FOLDERS
 from composer.model import Node, Parameter, Port, PortKind
 from composer.python_code.nodes import GENERAL_HANDLERS, Signature, handlers
 from composer.typed import SUFFIX
@@ -215,9 +214,7 @@ def _parameters(node: Node) -> Iterator[str]:
 
 def message_stubs(interfaces: Interfaces, names: Iterable[str] | None = None) -> dict[str, str]:
     """Return the stubs of interfaces and of the messages in them; by default, of all interfaces."""
-    if names is None:
-        names = (name for folder in FOLDERS for name in interfaces.names(folder))
-    pending = list(names)
+    pending = list(interfaces.names() if names is None else names)
     definitions: dict[str, Interface] = {}
     while pending:
         name = pending.pop()
