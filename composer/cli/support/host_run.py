@@ -82,7 +82,7 @@ def run_host(
     from composer.cli.support.console import queued_output
     from composer.cli.support.line_format import console_format
     from composer.cli.support.process import end_now, shown_address
-    from composer.cli.support.progress import Progress, run_log, severity_of, summary
+    from composer.cli.support.progress import Progress, RunLog, severity_of, summary
     from composer.model.names import join
     from composer.runtime.host import Host
     from composer.runtime.process import StartRefused
@@ -95,7 +95,8 @@ def run_host(
         is_part = "/" in system.name.value  # a process of a system: robot/perception
         name = join(system.namespace, system.name.value)
         is_child = bool(options.report_key)  # its lines go to the process that has started it
-        log = stack.enter_context(run_log(name, part=is_part, forwarded=is_child))
+        log = RunLog(name, part=is_part, forwarded=is_child)
+        stack.callback(log.close)
         address = None if dashboard is None else stack.enter_context(shown_address(dashboard))
         progress = Progress(sys.stderr, console_format(), address)
         if recording is not None:

@@ -96,14 +96,16 @@ def process_logs(
     system: System, processes: Sequence[RemoteProcess]
 ) -> Iterator[Callable[[RemoteProcess, LogLevel, str, str], None]]:
     """Keep the lines of processes on other computers in log files here, for 'compose logs'."""
-    from composer.cli.support.progress import run_log
+    from composer.cli.support.progress import RunLog
     from composer.model.names import join
     from composer.runtime.supervision.events import Logged
 
     with ExitStack() as stack:
         names = [item.process.name.value for item in processes]
         whole = join(system.namespace, system.name.value)
-        logs = {name: stack.enter_context(run_log(f"{whole}/{name}", part=True)) for name in names}
+        logs = {name: RunLog(f"{whole}/{name}", part=True) for name in names}
+        for each in logs.values():
+            stack.callback(each.close)
 
         def log(item: RemoteProcess, level: LogLevel, logger: str, message: str) -> None:
             logs[item.process.name.value].show(Logged(0.0, logger, level, message))

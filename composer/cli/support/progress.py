@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TextIO
 
 from composer.base.characters import counted
@@ -198,16 +197,6 @@ class RunLog:
             say(f"warning: 'compose logs' will not show this run: {problem}")
             return
         self._queue = OutputQueue(RotatingFile(self._folder.path), _note, name="run log")
-
-
-@contextmanager
-def run_log(system: str, *, part: bool = False, forwarded: bool = False) -> Iterator[RunLog]:
-    """Keep the log of a run within the block."""
-    log = RunLog(system, part=part, forwarded=forwarded)
-    try:
-        yield log
-    finally:
-        log.close()
 
 
 def _record(event: Event) -> Record:
