@@ -6,7 +6,6 @@ Among it is the system as its file declares it: for source lines, plans with cau
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +51,13 @@ class Dashboard:
     ros: RosSide
     feeds: Feeds
     interfaces: Interfaces
-    hello: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """What it shows: a system, or everything."""
+        if self.declared is not None:
+            return self.declared.system.name.value
+        return self.options.system or "ROS graph"
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,11 +58,6 @@ def run_dashboard(
         ros=ros,
         feeds=feeds,
         interfaces=interfaces,
-        hello={
-            "title": _title(options, declared),
-            "file": None if declared is None else declared.file,
-            "read_only": options.read_only,
-        },
     )
     url = f"http://{_in_url(address.host)}:{port}/?token={token}"
 
@@ -75,12 +70,6 @@ def run_dashboard(
     finally:
         RECORDINGS.close()
         ros.close(_LEAVES_WITHIN_S)
-
-
-def _title(options: Options, declared: Declared | None) -> str:
-    if declared is not None:
-        return declared.system.name.value
-    return options.system or "ROS graph"
 
 
 def _in_url(host: str) -> str:

@@ -143,7 +143,7 @@ class FoxgloveConnection(Link):
         self.post(
             {
                 "op": "serverInfo",
-                "name": f"ros2-composer: {self._dashboard.hello.get('title', '')}",
+                "name": f"ros2-composer: {self._dashboard.title}",
                 "capabilities": [
                     *(() if self.is_read_only else _CHANGING),
                     *(("time",) if self._known.has_clock else ()),

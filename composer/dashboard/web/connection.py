@@ -53,7 +53,13 @@ class Connection(Client):
         self._next_subscription = 1
 
     def _begin(self) -> None:
-        self._outbox.reply(to_json({"hello": self._dashboard.hello}))
+        declared = self._dashboard.declared
+        hello = {
+            "title": self._dashboard.title,
+            "file": None if declared is None else declared.file,
+            "read_only": self.is_read_only,
+        }
+        self._outbox.reply(to_json({"hello": hello}))
 
     def _end(self) -> None:
         for subscription in tuple(self._subscriptions):
