@@ -20,8 +20,8 @@ from composer.bags.bag import CDR, NANOSECONDS, BagError, BagMessage, BagTopic
 from composer.bags.definitions import full_definition
 from composer.bags.recorder import Recorder
 from composer.base.fast_dataclass import dataclass
-from composer.client.graph_names import InvalidNameError, full_name
-from composer.client.messages.topics import wait_until_acknowledged
+from composer.client.graph_names import InvalidNameError
+from composer.client.messages.topics import TopicPublisher
 from composer.client.messages.values import InvalidValueError, class_of
 from composer.client.session import Deadline, Session
 from composer.interfaces import Interfaces
@@ -153,17 +153,14 @@ class GraphReplay:
         self.count = 0
         #: The last time of time.monotonic, and how long the replay has run by then, without pauses.
         self._seen_s = self._passed_s = 0.0
-        self._publishers: dict[str, Any] = {}
+        self._publishers: dict[str, TopicPublisher] = {}
         problems: list[BagError] = []
         for topic in topics:
             try:
-                name = _name(options.names.get(topic.name, topic.name))
-                kind = _message_class(topic)
+                name = options.names.get(topic.name, topic.name)
+                self._publishers[topic.name] = _publisher(session, name, topic)
             except BagError as error:
                 problems.append(error)
-                continue
-            profile = rclpy_profile(offered(topic.qos))
-            self._publishers[topic.name] = session.node.create_publisher(kind, name, profile)
         if problems and not self._publishers:
             raise problems[0]
         for problem in problems:
@@ -175,7 +172,7 @@ class GraphReplay:
     def wait_for_subscriptions(self, timeout_s: float) -> None:
         """Wait until discovery is complete: the first messages reach all subscriptions."""
         self._session.wait_until_settled(
-            lambda: tuple(item.get_subscription_count() for item in self._publishers.values()),
+            lambda: tuple(item.subscriptions for item in self._publishers.values()),
             Deadline(timeout_s),
         )
 
@@ -198,7 +195,7 @@ class GraphReplay:
 
     def finish(self) -> bool:
         """Wait until reliable subscriptions have all messages, a second; return whether they do."""
-        results = [wait_until_acknowledged(item) for item in self._publishers.values()]
+        results = [item.wait_until_acknowledged() for item in self._publishers.values()]
         return all(results)
 
     def _wait_until(self, at_ns: int, start_ns: int) -> None:
@@ -228,18 +225,14 @@ class GraphReplay:
         self._clock.publish(ClockMessage(clock=Time(sec=seconds, nanosec=nanoseconds)))
 
 
-def _name(topic: str) -> str:
-    try:
-        return full_name("topic", topic)
-    except InvalidNameError as error:
-        raise BagError(str(error)) from error
-
-
-def _message_class(topic: BagTopic) -> Any:
+def _publisher(session: Session, name: str, topic: BagTopic) -> TopicPublisher:
+    """Return a publisher of a topic, by another name. Raises BagError."""
     if topic.message_encoding != CDR:
         raise BagError(f"'{topic.name}' has messages in {topic.message_encoding}, not in {CDR}")
     try:
-        return class_of(topic.type_name)
+        return TopicPublisher(session, name, topic.type_name, offered(topic.qos))
+    except InvalidNameError as error:
+        raise BagError(str(error)) from error
     except InvalidValueError as error:
         raise BagError(f"'{topic.name}': {error}", error.hint) from error
 

@@ -225,16 +225,13 @@ def publish(values: Values, _: Dashboard) -> Prepared:
     outgoing = read_outgoing(values)
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
-        outgoing.open(ros)
-        try:
+        with closing(outgoing.open(ros)) as publisher:
             limit = deadline.at_most(_MATCHED_WITHIN_S)
             expected = outgoing.expected()
-            ros.session.wait_for(lambda: outgoing.subscriptions >= expected or None, limit)
+            ros.session.wait_for(lambda: publisher.subscriptions >= expected or None, limit)
             outgoing.publish()
-            outgoing.wait_until_acknowledged()
-            return {"subscriptions": outgoing.subscriptions}
-        finally:
-            outgoing.close()
+            publisher.wait_until_acknowledged()
+            return {"subscriptions": publisher.subscriptions}
 
     return run, _SENT_WITHIN_S
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from itertools import pairwise
@@ -96,11 +96,9 @@ def publish(session: Session, deadline: Deadline, publication: Publication) -> I
     The deadline is for the subscriptions; raises NoResponseError. Raises NotAcknowledgedError after
     the last message. Expressions in messages see ``count`` (from 0) and ``now`` (seconds).
     """
-    publisher = session.node.create_publisher(
-        class_of(publication.type_name), publication.topic, rclpy_profile(publication.qos)
-    )
-    try:
-        _wait_for_subscriptions(session, deadline, publisher.get_subscription_count, publication)
+    topic, type_name = publication.topic, publication.type_name
+    with closing(TopicPublisher(session, topic, type_name, publication.qos)) as publisher:
+        _wait_for_subscriptions(session, deadline, publisher, publication)
         next_s = time.monotonic()
         count = 0
         while publication.times is None or count < publication.times:
@@ -111,27 +109,21 @@ def publish(session: Session, deadline: Deadline, publication: Publication) -> I
             next_s += 1.0 / publication.rate_hz
             if publication.times is None or count < publication.times:
                 session.spin_until(next_s)
-        if not wait_until_acknowledged(publisher):
-            raise _not_acknowledged_error(publication.topic)
-    finally:
-        session.node.destroy_publisher(publisher)
-
-
-def wait_until_acknowledged(publisher: Publisher) -> bool:
-    """Wait a second at most; return whether all reliable subscriptions have all messages."""
-    return publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S))
+        if not publisher.wait_until_acknowledged():
+            raise _not_acknowledged_error(topic)
 
 
 def _wait_for_subscriptions(
-    session: Session, deadline: Deadline, matched: Callable[[], int], publication: Publication
+    session: Session, deadline: Deadline, publisher: TopicPublisher, publication: Publication
 ) -> None:
-    if session.wait_for(lambda: matched() >= publication.wait_for or None, deadline) is None:
+    wanted = publication.wait_for
+    if session.wait_for(lambda: publisher.subscriptions >= wanted or None, deadline) is None:
         hint = (
             "use --wait-matching-subscriptions 0 to publish at once; 'compose topic info -v' shows"
             " QoS profiles"
         )
         raise NoResponseError(
-            f"found {matched()} of {publication.wait_for} subscriptions to"
+            f"found {publisher.subscriptions} of {wanted} subscriptions to"
             f" '{publication.topic}' within {deadline.timeout_s:g} s",
             type_mismatch_hint(session, "topic", publication.topic, publication.type_name) or hint,
         )
@@ -146,21 +138,34 @@ def _not_acknowledged_error(topic: str) -> NotAcknowledgedError:
     )
 
 
-class SerializedPublisher:
-    """Publishes serialized messages once they have proven to be messages of the type."""
+class TopicPublisher:
+    """A publisher of any topic."""
 
     def __init__(self, session: Session, topic: str, type_name: str, qos: QosProfile) -> None:
         """Raise InvalidValueError or InvalidNameError for a type or a name that is not valid."""
         self._session = session
         self._class = class_of(type_name)
         self._type_name = type_name
-        self._publisher = session.node.create_publisher(
+        self._publisher: Publisher = session.node.create_publisher(
             self._class, full_name("topic", topic), rclpy_profile(qos)
         )
 
-    def publish(self, data: bytes) -> None:
-        """Publish a message. Raises InvalidValueError."""
+    @property
+    def subscriptions(self) -> int:
+        """The number of subscriptions that receive the messages."""
+        return int(self._publisher.get_subscription_count())
+
+    def publish(self, message: Any) -> None:
+        """Publish a message, or its serialized bytes."""
+        self._publisher.publish(message)
+
+    def publish_checked(self, data: bytes) -> None:
+        """Publish bytes that are a message of the type. Raises InvalidValueError for others."""
         self._publisher.publish(_message(data, self._class, self._type_name))
+
+    def wait_until_acknowledged(self) -> bool:
+        """Wait a second at most; return whether all reliable subscriptions have all messages."""
+        return self._publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGED_WITHIN_S))
 
     def close(self) -> None:
         """Destroy the publisher."""

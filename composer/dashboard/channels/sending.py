@@ -17,6 +17,7 @@ from composer.model.qos import PRESETS, Durability, QosProfile, incompatibilitie
 
 if TYPE_CHECKING:
     from composer.client.calls import FinishedGoal
+    from composer.client.messages.topics import TopicPublisher
     from composer.dashboard.observing.ros_graph import RosGraph
     from composer.plan.drift import ObservedEndpoint
 
@@ -35,28 +36,23 @@ class Outgoing:
         self.type_name = type_name
         self._values = values
         self._ros: RosGraph
-        self._publisher: Any = None
         self._message: Any = None
+        self.publisher: TopicPublisher
 
-    def open(self, ros: RosGraph) -> None:
-        """Create the publisher. Raises RosError, RequestError."""
+    def open(self, ros: RosGraph) -> TopicPublisher:
+        """Create the publisher, and return it. Raises RosError, RequestError."""
         from composer.client.graph_names import full_name
+        from composer.client.messages.topics import TopicPublisher
         from composer.client.messages.values import build_message, class_of
-        from composer.runtime.ros.conversions import rclpy_profile
 
         self._ros = ros
         message_class = class_of(self.type_name)
         values = ros.forms.from_json(self._values, self.type_name, "message")
         self._message = build_message(values, message_class, "the message")
         topic = self.topic = full_name("topic", self.topic)
-        self._publisher = ros.session.node.create_publisher(
-            message_class, topic, rclpy_profile(suitable_profile(ros, topic))
-        )
-
-    @property
-    def subscriptions(self) -> int:
-        """The number of subscriptions that receive the message."""
-        return int(self._publisher.get_subscription_count())
+        profile = suitable_profile(ros, topic)
+        self.publisher = TopicPublisher(ros.session, topic, self.type_name, profile)
+        return self.publisher
 
     def expected(self) -> int:
         """Return the number of known subscriptions that the publisher will match."""
@@ -66,19 +62,7 @@ class Outgoing:
 
     def publish(self) -> None:
         """Publish the message once."""
-        self._publisher.publish(self._message)
-
-    def wait_until_acknowledged(self) -> None:
-        """Wait a second at most until reliable subscriptions have the message."""
-        from composer.client.messages.topics import wait_until_acknowledged
-
-        wait_until_acknowledged(self._publisher)
-
-    def close(self) -> None:
-        """Destroy the publisher."""
-        if self._publisher is not None:
-            self._ros.session.node.destroy_publisher(self._publisher)
-            self._publisher = None
+        self.publisher.publish(self._message)
 
 
 def suitable_profile(ros: RosGraph, topic: str) -> QosProfile:
@@ -115,8 +99,7 @@ class PublishingFeed(Feed):
 
     def start(self) -> None:
         """Create the publisher. Raises RosError."""
-        self.resources.callback(self._outgoing.close)
-        self._outgoing.open(self.ros)
+        self.resources.callback(self._outgoing.open(self.ros).close)
 
     def poll(self) -> Iterator[Update]:
         """Publish, and yield the count from time to time."""
@@ -125,7 +108,7 @@ class PublishingFeed(Feed):
         now_s = time.monotonic()
         if now_s >= self._reported_s + _REPORT_PERIOD_S:
             self._reported_s = now_s
-            data = {"count": self._count, "subscriptions": self._outgoing.subscriptions}
+            data = {"count": self._count, "subscriptions": self._outgoing.publisher.subscriptions}
             yield Update(to_json(data))
 
 

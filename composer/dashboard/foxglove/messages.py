@@ -24,7 +24,7 @@ from composer.dashboard.web.client import POLICY_VIOLATION, Client, End
 from composer.model.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
-    from composer.client.messages.topics import SerializedPublisher
+    from composer.client.messages.topics import TopicPublisher
     from composer.client.shared_session import SampledTopic
     from composer.dashboard.observing.topics import TopicReader
 
@@ -158,7 +158,7 @@ class PublishedFeed(Feed):
         self._type_name = type_name if "/" in name else f"{package}/msg/{name}"
         self._budget = budget
         self._waiting: deque[bytes] = deque()
-        self._publisher: SerializedPublisher
+        self._publisher: TopicPublisher
         self._problem = ""  # why there is no publisher
 
     @property
@@ -183,13 +183,13 @@ class PublishedFeed(Feed):
 
     def start(self) -> None:
         """Create the publisher; what waits is lost if that is not possible."""
-        from composer.client.messages.topics import SerializedPublisher
+        from composer.client.messages.topics import TopicPublisher
         from composer.dashboard.channels.sending import suitable_profile
 
         try:
             profile = suitable_profile(self.ros, self.topic)
             session = self.ros.session
-            self._publisher = SerializedPublisher(session, self.topic, self._type_name, profile)
+            self._publisher = TopicPublisher(session, self.topic, self._type_name, profile)
         except Exception as error:
             self._problem = f"{error!s:.200}"
             self.forget()
@@ -203,7 +203,7 @@ class PublishedFeed(Feed):
 
         while (data := self._take()) is not None:
             try:
-                self._publisher.publish(data)
+                self._publisher.publish_checked(data)
             except RosError as error:
                 failed = from_ros(error)
                 message = to_json({**failed.as_data(), "message": f"'{self.topic}': {failed}"})
