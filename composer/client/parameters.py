@@ -28,7 +28,6 @@ from composer.client.session import Deadline, NoResponseError, RosError, Session
 from composer.client.systems.local_queries import nodes_with
 from composer.client.systems.managers import DISCOVERY_S, Systems
 from composer.client.systems.node_services import NodeServices
-from composer.language.tree import Plain
 from composer.model import SEVERITIES, LogLevel
 from composer.model.names import is_hidden
 from composer.runtime.callbacks.log import logger_name
@@ -36,8 +35,6 @@ from composer.runtime.protocol.requests import NAME, ParameterDescription
 from composer.runtime.ros.conversions import NOT_SET, description, plain_value
 
 T = TypeVar("T")
-#: How long to wait for the responses of nodes; the parameters of later ones have no description.
-_RESPONSE_S = 2.0
 _GET, _SET = "get_logger_levels", "set_logger_levels"
 _GET_TYPE = "rcl_interfaces/srv/GetLoggerLevels"
 #: Of a logger whose level was never set: the level of its process applies.
@@ -201,46 +198,6 @@ def _converted(value: Any, kind: str) -> Any:
             return [bytes([item]) if type(item) is int else item for item in value]
         case _:
             return value
-
-
-def parameter_settings(
-    session: Session, deadline: Deadline, names: Mapping[str, Iterable[str]]
-) -> dict[str, dict[str, dict[str, Plain]]]:
-    """Return the declarations of parameters as in YAML, by node and parameter.
-
-    ``names`` are the parameters of each node. Nodes without the service, or that do not respond,
-    are left out.
-    """
-    limit = deadline.at_most(_RESPONSE_S)
-    with NodeServices(session) as services:
-        known = services.nodes(DescribeParameters, limit)
-        requests = {
-            node: DescribeParameters.Request(names=list(parameters))
-            for node, parameters in names.items()
-            if node in known
-        }
-        responses = services.call_all(DescribeParameters, requests, limit)
-    found: dict[str, dict[str, dict[str, Plain]]] = {}
-    for node, response in responses.items():
-        listed = requests[node].names
-        if response is not None and len(response.descriptors) == len(listed):
-            descriptions = map(description, listed, response.descriptors)
-            found[node] = {item.name: _settings_of(item) for item in descriptions}
-    return found
-
-
-def _settings_of(item: ParameterDescription) -> dict[str, Plain]:
-    """Return the declaration of a parameter as in YAML, without its value."""
-    settings: dict[str, Plain] = {
-        "minimum": item.minimum,
-        "maximum": item.maximum,
-        "step": item.step,
-        "read_only": item.read_only or None,
-        "description": item.description or None,
-    }
-    if "unknown" not in item.type and item.type != "not set":
-        settings["type"] = item.type
-    return {key: value for key, value in settings.items() if value is not None}
 
 
 class LevelRejectedError(RosError):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Self
 
 from lifecycle_msgs.srv import GetState
-from rcl_interfaces.srv import GetParameters, ListParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
 from composer.client.messages.topics import measure_rates
 from composer.client.session import Deadline, Session
@@ -16,7 +16,8 @@ from composer.language.tree import Plain
 from composer.model.interface_packages import COMPOSITION
 from composer.model.names import is_hidden
 from composer.plan.drift import ObservedNode, Snapshot
-from composer.runtime.ros.conversions import plain_value
+from composer.runtime.protocol.requests import ParameterDescription
+from composer.runtime.ros.conversions import description, plain_value
 from composer.runtime.ros.endpoints import endpoints, node_names, visible_topics
 from composer.runtime.ros.messages import MessageError, interface_class
 
@@ -118,7 +119,43 @@ class GraphObserver:
                 found[node] = dict(zip(names, map(plain_value, response.values), strict=True))
         return found
 
+    def parameter_settings(
+        self, names: Mapping[str, Iterable[str]], deadline: Deadline
+    ) -> dict[str, dict[str, dict[str, Plain]]]:
+        """Return the declarations of parameters as in YAML, by node and parameter.
+
+        ``names`` are the parameters of each node. Nodes without the service, or that do not
+        respond, are left out.
+        """
+        requests = {
+            node: DescribeParameters.Request(names=list(names[node]))
+            for node in self._asked(names.keys(), DescribeParameters, deadline)
+        }
+        limit = deadline.at_most(_RESPONSE_S)
+        responses = self._services.call_all(DescribeParameters, requests, limit)
+        found: dict[str, dict[str, dict[str, Plain]]] = {}
+        for node, response in responses.items():
+            listed = requests[node].names
+            if response is not None and len(response.descriptors) == len(listed):
+                descriptions = map(description, listed, response.descriptors)
+                found[node] = {item.name: _settings_of(item) for item in descriptions}
+        return found
+
     def _asked(self, nodes: Collection[str], kind: Any, deadline: Deadline) -> list[str]:
         """Return the nodes that have a service."""
         offering = self._services.nodes(kind, deadline.at_most(_RESPONSE_S))
         return [node for node in nodes if node in offering and not is_hidden(node)]
+
+
+def _settings_of(item: ParameterDescription) -> dict[str, Plain]:
+    """Return the declaration of a parameter as in YAML, without its value."""
+    settings: dict[str, Plain] = {
+        "minimum": item.minimum,
+        "maximum": item.maximum,
+        "step": item.step,
+        "read_only": item.read_only or None,
+        "description": item.description or None,
+    }
+    if "unknown" not in item.type and item.type != "not set":
+        settings["type"] = item.type
+    return {key: value for key, value in settings.items() if value is not None}

@@ -87,13 +87,12 @@ def live(
     """
     with ros_session("compose import live", timeout) as (session, deadline):
         from composer.bridges.importing.live import describe_graph
-        from composer.client.parameters import parameter_settings
         from composer.client.snapshot import GraphObserver
 
         with GraphObserver(session) as observer:
             snapshot = observer.snapshot(deadline)
-        names = {node.full_name: tuple(node.parameters or ()) for node in snapshot.nodes}
-        settings = parameter_settings(session, deadline, names)
+            names = {node.full_name: tuple(node.parameters or ()) for node in snapshot.nodes}
+            settings = observer.parameter_settings(names, deadline)
     found = describe_graph(system, snapshot, settings, _known_types(), nodes or ())
     if not found.nodes:
         matching = f" matches {', '.join(nodes)}" if nodes else " was found"
