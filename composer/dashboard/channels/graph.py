@@ -25,7 +25,6 @@ _MIN_SIDE, _MAX_SIDE = 16.0, 16384.0
 _DECLARED_ONLY = ("lifecycle", "deployment")
 #: Topics without a report are measured, but no more than these.
 _MAX_MEASURED = 60
-_MANAGER = "manager"
 #: While the graph changes.
 _SOON_S = 0.1
 
@@ -146,11 +145,11 @@ class LiveFeed(Feed):
 
     def _measure(self, reported: set[str]) -> dict[str, Any]:
         """Measure the topics that no system reports; return their rates."""
-        topology, systems = self.ros.topology(), set(self.ros.reports.current())
-        known = (topology.revision, systems, reported)
+        topology = self.ros.topology()
+        known = (topology.revision, reported)
         if known != self._known:
             self._known = known
-            topics = _unreported(topology, systems, reported)
+            topics = _unreported(topology, reported)
             self._set_measured(set(islice(topics, _MAX_MEASURED)))
         if not self._measured:
             return {}
@@ -169,12 +168,11 @@ class LiveFeed(Feed):
         self._measured = topics
 
 
-def _unreported(topology: Topology, systems: set[str], reported: set[str]) -> Iterator[str]:
+def _unreported(topology: Topology, reported: set[str]) -> Iterator[str]:
     """Yield the topics that no system reports, and that are not for tools."""
-    managers = {f"{system}/{_MANAGER}" for system in systems}
     for topic, ends in topology.of_topics.items():
         # Managers report only while others listen.
         if topic not in reported and not all(
-            end.is_for_tools or node in managers for node, end in ends
+            end.is_for_tools or node in topology.managers for node, end in ends
         ):
             yield topic
