@@ -225,8 +225,8 @@ class LoggerLevels:
         for node, server in sorted(servers.items()):
             by_server.setdefault(server, []).append(node)
         levels: dict[str, str | None] = dict.fromkeys(sorted(servers))
-        for server, nodes in by_server.items():
-            (response,) = self._levels(server, nodes).values()
+        responses = self._levels(by_server).values()
+        for nodes, response in zip(by_server.values(), responses, strict=True):
             if response is not None:
                 levels.update(zip(nodes, map(_name_of, response.levels), strict=False))
         return levels
@@ -237,7 +237,7 @@ class LoggerLevels:
         Raises NotFoundError; RosError if the level of the node cannot be read.
         """
         found, server = self._find(node)
-        response = required(self._levels(server, [found]), self._deadline)
+        response = required(self._levels({server: [found]}), self._deadline)
         return found, _name_of(response.levels[0])
 
     def set(self, node: str, level: LogLevel) -> str:
@@ -253,10 +253,12 @@ class LoggerLevels:
             raise LevelRejectedError(f"{found} did not set its log level: {result.reason}")
         return found
 
-    def _levels(self, server: str, nodes: list[str]) -> dict[str, Any]:
-        """Return the response of a server by the name of its service, None without one."""
-        request = GetLoggerLevels.Request(names=list(map(logger_name, nodes)))
-        calls = {f"{server}/{_GET}": (GetLoggerLevels, request)}
+    def _levels(self, nodes: Mapping[str, list[str]]) -> dict[str, Any]:
+        """Return the responses by the names of services, None without one; ``nodes`` by server."""
+        calls = {}
+        for server, served in nodes.items():
+            request = GetLoggerLevels.Request(names=list(map(logger_name, served)))
+            calls[f"{server}/{_GET}"] = (GetLoggerLevels, request)
         return self._caller.call_each(calls, self._deadline)
 
     def _find(self, node: str) -> tuple[str, str]:
