@@ -7,16 +7,20 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import pytest
 from composer_interfaces.action import Navigate
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.srv import GetParameters
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from composer.client.calls import GoalClient
 from composer.client.lifecycle import active_dependents, inactive_dependents, lowered
+from composer.client.parameters import UNSET, LoggerLevels
 from composer.client.requests import wait_until_known
 from composer.client.session import Deadline, Session
 from composer.client.shared_session import InvalidHandle, SharedSession
@@ -55,6 +59,28 @@ def test_a_server_knows_the_clients_of_a_session_once_its_process_responds(
 def test_a_server_without_parameter_services_is_called_at_once(ros_domain_id: int) -> None:
     with Session() as session:
         assert not wait_until_known(session, "/nothing", Deadline(float("inf")))
+
+
+def test_a_silent_node_does_not_hide_the_log_levels_of_others(peer: Peer) -> None:
+    name = peer.join("talking", LoggingNode).get_fully_qualified_name()
+    context = Context()
+    context.init([])
+    silent = LoggingNode("a_silent", context=context)  # nothing spins it
+    try:
+        with Session() as session:
+            service = "/get_logger_levels"
+            known = session.graph.services
+            wait_until(lambda: sum(each.endswith(service) for each, _ in known()) == 2, service)
+            levels = LoggerLevels(session, Deadline(5.0)).all()
+    finally:
+        silent.destroy_node()
+        context.try_shutdown()
+    assert levels == {"/a_silent": None, name: UNSET}
+
+
+class LoggingNode(Node):
+    def __init__(self, name: str, **arguments: Any) -> None:
+        super().__init__(name, enable_logger_service=True, **arguments)
 
 
 PROCESS_LIST = "import sys, composer.client.systems.process_list; sys.exit('numpy' in sys.modules)"
