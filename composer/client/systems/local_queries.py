@@ -21,6 +21,8 @@ from composer.runtime.process.query_socket import ask
 from composer.runtime.protocol.codec import decode
 from composer.runtime.protocol.reports import SystemReport, split_signature
 from composer.runtime.protocol.requests import (
+    IS_ACTIVE,
+    NAME,
     DetailsAnswer,
     DetailsQuery,
     EndpointsAnswer,
@@ -46,7 +48,7 @@ RESPONSE_S = 0.6
 ENDPOINTS_S = 1.0
 _STATE_SERVICE, _STATE_TYPE = "/get_state", "lifecycle_msgs/srv/GetState"
 _LIST_SERVICE, _LIST_TYPE = "/list_parameters", "rcl_interfaces/srv/ListParameters"
-_MANAGER_SERVICE = "/manager/is_active"
+_MANAGER_SERVICE, _MANAGER_TYPE = f"/{NAME}/{IS_ACTIVE}", "std_srvs/srv/Trigger"
 
 
 def parse_state(name: str, text: str) -> SystemReport:
@@ -64,6 +66,14 @@ def nodes_with(services: Iterable[NameAndTypes], suffix: str, type_name: str) ->
         for name, types in services
         if name.endswith(suffix) and type_name in types
     }
+
+
+def systems_with(services: Iterable[NameAndTypes]) -> set[str]:
+    """Return the systems whose managers have these services.
+
+    The name is the namespace of the manager: ``/pipeline``, ``/robot1/pipeline``.
+    """
+    return nodes_with(services, _MANAGER_SERVICE, _MANAGER_TYPE) - {""}
 
 
 def of_system(name: str, report: SystemReport) -> SystemReport:
@@ -208,14 +218,10 @@ def local_reports(timeout_s: float, *, callbacks: bool = False) -> dict[str, Sys
         for system in sorted(local_systems())
     }
     found = {system: report for system, report in reports.items() if report is not None}
-    managers = {
-        name.removesuffix(_MANAGER_SERVICE)
-        for name, _ in view["service"]
-        if name.endswith(_MANAGER_SERVICE)
-    }
+    systems = systems_with(view["service"])
     nodes = {node.node for report in found.values() for node in report.nodes}
     lifecycle_nodes = nodes_with(view["service"], _STATE_SERVICE, _STATE_TYPE)
-    complete = len(found) == len(reports) and managers <= found.keys() and lifecycle_nodes <= nodes
+    complete = len(found) == len(reports) and systems <= found.keys() and lifecycle_nodes <= nodes
     return with_callbacks_of_processes(found) if complete else None
 
 

@@ -19,14 +19,13 @@ from composer.base.characters import visible
 from composer.client.graph_names import NotFoundError, not_found_error
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, Session
-from composer.client.systems.local_queries import nodes_with, parse_state, with_processes
+from composer.client.systems.local_queries import parse_state, systems_with, with_processes
 from composer.model.names import is_selected
 from composer.runtime.process.instance_lock import is_held, local_systems
 from composer.runtime.protocol.codec import OtherVersionError, ProtocolError, decode
 from composer.runtime.protocol.reports import SystemReport, TimingReport
 from composer.runtime.protocol.requests import (
     CALLBACKS_TOPIC,
-    IS_ACTIVE,
     NAME,
     REQUEST,
     STATE_TOPIC,
@@ -44,8 +43,6 @@ from composer.runtime.ros.service_requests import (
 
 T = TypeVar("T")
 
-_TRIGGER_TYPE = "std_srvs/srv/Trigger"
-_SERVICE = f"/{NAME}/{IS_ACTIVE}"
 #: Fast DDS discovers a participant at once or within 3 s; managers report every second.
 DISCOVERY_S = 3.5
 #: Managers publish their last report to each new subscription, and again every second.
@@ -83,12 +80,8 @@ class Systems:
         self._subscriptions: dict[str, list[Subscription]] = {}
 
     def discover(self) -> tuple[str, ...]:
-        """Return the names of all systems discovered so far, and subscribe to their reports.
-
-        The name is the namespace of the manager: ``/pipeline``, ``/robot1/pipeline``.
-        """
-        services = self._session.graph.services()
-        found = tuple(sorted(nodes_with(services, _SERVICE, _TRIGGER_TYPE) - {""}))
+        """Return the names of all systems discovered so far, and subscribe to their reports."""
+        found = tuple(sorted(systems_with(self._session.graph.services())))
         self.subscribe(found)
         return found
 
