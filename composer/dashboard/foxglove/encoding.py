@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 from composer.base.fast_dataclass import dataclass
@@ -122,25 +123,17 @@ class Schemas:
 
     def __init__(self, interfaces: Interfaces) -> None:
         self._interfaces = interfaces
-        self._messages: dict[str, str | None] = {}
-        self._services: dict[str, tuple[str, str] | None] = {}
+        # With a limit: any node can announce names of types.
+        self.message = lru_cache(_MAX_SCHEMAS)(self._message)
+        self.service = lru_cache(_MAX_SCHEMAS)(self._service)
 
-    def message(self, name: str) -> str | None:
+    def _message(self, name: str) -> str | None:
         """Return the schema of a message; None if a definition is not known."""
-        if name not in self._messages:
-            _make_room(self._messages)
-            found = self._interfaces.message(name)
-            self._messages[name] = None if found is None else self._text(found)
-        return self._messages[name]
-
-    def service(self, name: str) -> tuple[str, str] | None:
-        """Return the schemas of the request and the response of a service, or None."""
-        if name not in self._services:
-            _make_room(self._services)
-            self._services[name] = self._service(name)
-        return self._services[name]
+        found = self._interfaces.message(name)
+        return None if found is None else self._text(found)
 
     def _service(self, name: str) -> tuple[str, str] | None:
+        """Return the schemas of the request and the response of a service, or None."""
         found = self._interfaces.find(name)
         if not isinstance(found, Service):
             return None
@@ -163,12 +156,6 @@ class Schemas:
         parts = [_definition(message)]
         parts += [f"MSG: {_short(name)}\n{_definition(found)}" for name, found in inner.items()]
         return f"{_SEPARATOR}\n".join(parts)
-
-
-def _make_room(schemas: dict[str, Any]) -> None:
-    """Forget schemas if there are too many: any node can announce names of types."""
-    if len(schemas) >= _MAX_SCHEMAS:
-        schemas.clear()
 
 
 def _definition(message: Message) -> str:
