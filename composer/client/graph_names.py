@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from rclpy.exceptions import InvalidTopicNameException
@@ -133,9 +133,14 @@ def find_node(
             raise not_found_error(kind, name, known)
     if name not in found:  # wait for other nodes with the same last part
         found = _matches(name, session.wait_until_settled(list_nodes, deadline))
+    return only_match(kind, name, found)
+
+
+def only_match(kind: str, name: str, found: Sequence[str]) -> str:
+    """Return the only name that ``name`` refers to. Raises NotFoundError if there are several."""
     if len(found) > 1:
         raise NotFoundError(
-            f"'{name}' matches more than one {kind}", "use a full name: " + ", ".join(found)
+            f"'{name}' matches more than one {kind}", f"use a full name: {', '.join(found)}"
         )
     return found[0]
 

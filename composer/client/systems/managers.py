@@ -16,7 +16,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from composer.base.characters import visible
-from composer.client.graph_names import NotFoundError, not_found_error
+from composer.client.graph_names import NotFoundError, not_found_error, only_match
 from composer.client.requests import ServiceCaller
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.local_queries import parse_state, systems_with, with_processes
@@ -102,11 +102,7 @@ class Systems:
             error = not_found_error("running system", name, known)
             none = "no system is running: start one with 'compose run'"
             raise NotFoundError(str(error), error.hint if known else none)
-        if len(found) > 1:
-            raise NotFoundError(
-                f"'{name}' matches more than one system", f"use a full name: {', '.join(found)}"
-            )
-        return found[0]
+        return only_match("system", name, found)
 
     def only(self) -> str:
         """Return the full name of the only running system. Raises NotFoundError."""

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from lifecycle_msgs.srv import GetState
 
-from composer.client.graph_names import NotFoundError, not_found_error
+from composer.client.graph_names import not_found_error, only_match
 from composer.client.session import Deadline, NoResponseError, Session
 from composer.client.systems.local_queries import with_callbacks_of_processes
 from composer.client.systems.managers import DISCOVERY_S, REPORT_WITHIN_S, Systems, without_members
@@ -119,8 +119,4 @@ def _matches(target: str, known: Iterable[str], silent: list[str]) -> list[str]:
         )
     if not found:
         raise not_found_error("node of a running system", target, known)
-    if len(found) > 1 and not is_pattern(target):
-        raise NotFoundError(
-            f"'{target}' matches more than one node", f"use a full name: {', '.join(found)}"
-        )
-    return found
+    return found if is_pattern(target) else [only_match("node", target, found)]
