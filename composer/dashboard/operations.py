@@ -12,7 +12,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from composer.dashboard.channels.nodes import COMMANDS
-from composer.dashboard.channels.sending import read_outgoing
+from composer.dashboard.channels.sending import Outgoing
 from composer.dashboard.channels.topics import shown_qos
 from composer.dashboard.context import Dashboard, Operation, Prepared, required
 from composer.dashboard.protocol.messages import RequestError, Values, from_ros, json_safe
@@ -222,7 +222,7 @@ def call(values: Values, _: Dashboard) -> Prepared:
 
 def publish(values: Values, _: Dashboard) -> Prepared:
     """Publish one message, and wait until reliable subscriptions have it."""
-    outgoing = read_outgoing(values)
+    outgoing = Outgoing(values)
 
     def run(ros: RosGraph, deadline: Deadline) -> dict[str, Any]:
         with closing(outgoing.open(ros)) as publisher:

@@ -31,10 +31,10 @@ _SLOTS = threading.BoundedSemaphore(16)
 class Outgoing:
     """A message with its publisher, once it is open."""
 
-    def __init__(self, topic: str, type_name: str, values: Any) -> None:
-        self.topic = topic
-        self.type_name = type_name
-        self._values = values
+    def __init__(self, values: Values) -> None:
+        """Read the message that a request describes. Raises RequestError."""
+        self.topic, self.type_name = values.text("topic"), values.text("type")
+        self._values = values.mapping("message")
         self._ros: RosGraph
         self._message: Any = None
         self.publisher: TopicPublisher
@@ -79,12 +79,6 @@ def _subscriptions(ros: RosGraph, topic: str) -> list[ObservedEndpoint]:
     return [end for _, end in ends if end.kind is PortKind.SUBSCRIPTION]
 
 
-def read_outgoing(values: Values) -> Outgoing:
-    """Return the message that a request describes. Raises RequestError."""
-    topic, type_name = values.text("topic"), values.text("type")
-    return Outgoing(topic, type_name, values.mapping("message"))
-
-
 class PublishingFeed(Feed):
     """A publisher that repeats one message."""
 
@@ -92,7 +86,7 @@ class PublishingFeed(Feed):
     changes = True
 
     def __init__(self, values: Values, _: Declared | None) -> None:
-        self._outgoing: Outgoing = read_outgoing(values)
+        self._outgoing = Outgoing(values)
         self.period_s = 1.0 / values.number("rate_hz", 1.0, 0.01, 100.0)
         self._count = 0
         self._reported_s = 0.0
