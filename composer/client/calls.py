@@ -120,14 +120,14 @@ class AcceptedGoal:
         """Cancel the goal and wait for its end. Raises NoResponseError if it does not end."""
         limit = Deadline(_CANCEL_WITHIN_S)
         self._handle.cancel_goal_async()
-        if self._session.wait_for(lambda: self._result.done() or None, limit) is None:
+        if not self._session.wait_for(self._result.done, limit):
             raise NoResponseError(f"the goal was not canceled within {_CANCEL_WITHIN_S:g} s")
         return self._finished()
 
     def _wait_for_last_result(self) -> None:
         """Wait for a result that was sent before the server went away. Raises NoResponseError."""
         limit = Deadline(_LAST_RESULT_S)
-        if self._session.wait_for(lambda: self._result.done() or None, limit) is None:
+        if not self._session.wait_for(self._result.done, limit):
             raise NoResponseError(f"the server of '{self._name}' is gone, so the goal is lost")
 
     def _finished(self) -> FinishedGoal:
@@ -160,7 +160,7 @@ def send_goal(session: Session, deadline: Deadline, request: GoalRequest) -> Ite
     client = GoalClient(session.node, action, name)
     try:
         is_ready = session.wait_for(
-            lambda: client.server_is_ready() or request.should_stop() or None, deadline
+            lambda: client.server_is_ready() or request.should_stop(), deadline
         )
         if client.server_is_ready():
             wait_until_known(session, f"{name}/_action/send_goal", deadline)
@@ -174,7 +174,7 @@ def send_goal(session: Session, deadline: Deadline, request: GoalRequest) -> Ite
         response: Future = client.send_goal_async(
             message, lambda item: request.on_feedback(item.feedback)
         )
-        if not session.wait_for(lambda: response.done() or None, deadline):
+        if not session.wait_for(response.done, deadline):
             raise NoResponseError(f"no goal response from '{name}' within {deadline.timeout_s:g} s")
         if not response.result().accepted:
             raise GoalRejectedError(f"'{name}' rejected the goal")

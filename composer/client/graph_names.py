@@ -124,8 +124,8 @@ def find_node(
     ``name`` is a full name, or the last part or parts of a single node's name. Raises
     NotFoundError; NoResponseError if the node may be in a system that does not respond.
     """
-    found = session.search(lambda: _matches(name, list_nodes()) or None, deadline)
-    if found is None:
+    found = session.search(lambda: _matches(name, list_nodes()), deadline)
+    if not found:
         check_all_respond(session)
         known = list_nodes()  # it may have been discovered meanwhile
         found = _matches(name, known)

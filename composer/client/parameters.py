@@ -63,9 +63,7 @@ class ParameterClient:
         self.node = GraphNames(session, deadline).find_node(node)
         self._services = NodeServices(session)
         # Its manager may have the services: wait until that, or the node itself, is discovered.
-        session.search(
-            lambda: self._services.has(self.node, ListParameters, deadline) or None, deadline
-        )
+        session.search(lambda: self._services.has(self.node, ListParameters, deadline), deadline)
 
     def close(self) -> None:
         """Destroy clients and subscriptions; the end of the session does so too."""
@@ -217,7 +215,7 @@ class LoggerLevels:
         """Return the levels of all nodes that can be asked, None for those that do not respond."""
         self._session.wait_until_settled(self._systems.discover, self._deadline)
         self._session.wait_for(
-            lambda: None not in self._systems.current().values() or None,
+            lambda: None not in self._systems.current().values(),
             self._deadline.at_most(DISCOVERY_S),
         )
         servers = self._servers()

@@ -57,7 +57,7 @@ class ServiceCaller:
     def call_once(self, service: Any, name: str, request: Any, deadline: Deadline) -> Any:
         """Return the response to a request that is sent only once. Raises NoResponseError."""
         client = self._client(service, name)
-        if not self._session.wait_for(lambda: client.service_is_ready() or None, deadline):
+        if not self._session.wait_for(client.service_is_ready, deadline):
             text = f"no server of service '{name}' found within {deadline.timeout_s:g} s"
             raise self._error(text, service, name)
         servers = frozenset(map(participant, servers_of(self._session.node, name)))

@@ -157,32 +157,31 @@ class Session:
         while not pause.passed:
             self.spin_once(pause)
 
-    def wait_for(self, poll: Callable[[], T | None], deadline: Deadline) -> T | None:
-        """Return the first result of ``poll`` that is not None; None at the deadline."""
-        while True:
-            found = poll()
-            if found is not None or deadline.passed:
-                return found
-            self.spin_once(deadline)
+    def wait_for(self, poll: Callable[[], T], deadline: Deadline) -> T:
+        """Return the first result of ``poll`` that is true; the last one at the deadline."""
+        return self._polled(poll, bool, deadline)
 
     def wait_until_settled(self, poll: Callable[[], T], deadline: Deadline) -> T:
         """Return the result of ``poll`` once discovery is complete, or at the deadline."""
         last_change = _LastChange()
-        while True:
-            found = poll()
-            if self._is_discovery_complete(last_change.at_s(found)) or deadline.passed:
-                return found
-            self.spin_once(deadline)
+        return self._polled(
+            poll, lambda found: self._is_discovery_complete(last_change.at_s(found)), deadline
+        )
 
-    def search(self, poll: Callable[[], T | None], deadline: Deadline) -> T | None:
-        """Return the first result of ``poll`` that is not None.
+    def search(self, poll: Callable[[], T], deadline: Deadline) -> T:
+        """Return the first result of ``poll`` that is true.
 
-        Returns None once discovery is complete, or at the deadline.
+        Returns the last one once discovery is complete, or at the deadline.
         """
         started_s = time.monotonic()
+        return self._polled(
+            poll, lambda found: bool(found) or self._is_discovery_complete(started_s), deadline
+        )
+
+    def _polled(self, poll: Callable[[], T], is_last: Callable[[T], bool], deadline: Deadline) -> T:
         while True:
             found = poll()
-            if found is not None or self._is_discovery_complete(started_s) or deadline.passed:
+            if is_last(found) or deadline.passed:
                 return found
             self.spin_once(deadline)
 

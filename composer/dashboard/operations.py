@@ -228,7 +228,7 @@ def publish(values: Values, _: Dashboard) -> Prepared:
         with closing(outgoing.open(ros)) as publisher:
             limit = deadline.at_most(_MATCHED_WITHIN_S)
             expected = outgoing.expected()
-            ros.session.wait_for(lambda: publisher.subscriptions >= expected or None, limit)
+            ros.session.wait_for(lambda: publisher.subscriptions >= expected, limit)
             outgoing.publish()
             publisher.wait_until_acknowledged()
             return {"subscriptions": publisher.subscriptions}

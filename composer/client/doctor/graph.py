@@ -60,7 +60,7 @@ def check_discovery(session: Session, deadline: Deadline) -> CheckResult:
     try:
         node = Node(name, context=context, use_global_arguments=False)
         discovered = session.wait_for(
-            lambda: name in {known for known, _ in session.graph.nodes()} or None, limit
+            lambda: name in {known for known, _ in session.graph.nodes()}, limit
         )
         node.destroy_node()
     finally:

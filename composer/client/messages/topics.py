@@ -117,7 +117,7 @@ def _wait_for_subscriptions(
     session: Session, deadline: Deadline, publisher: TopicPublisher, publication: Publication
 ) -> None:
     wanted = publication.wait_for
-    if session.wait_for(lambda: publisher.subscriptions >= wanted or None, deadline) is None:
+    if not session.wait_for(lambda: publisher.subscriptions >= wanted, deadline):
         hint = (
             "use --wait-matching-subscriptions 0 to publish at once; 'compose topic info -v' shows"
             " QoS profiles"

@@ -139,7 +139,7 @@ class Systems:
         """Return the reports that arrive before the deadline, None for the other systems."""
         requested = sorted(names)
         self._wait_for_reports(requested, deadline)
-        self._session.wait_for(lambda: all(map(self._is_fresh, requested)) or None, deadline)
+        self._session.wait_for(lambda: all(map(self._is_fresh, requested)), deadline)
         return {name: self._report(name) if name in self._states else None for name in requested}
 
     def other_version(self, name: str) -> OtherVersionError | None:
@@ -205,7 +205,7 @@ class Systems:
         is_local = is_held(name)
         _, message = self.command(name, "shutdown")
         if is_local:
-            self._session.wait_for(lambda: not is_held(name) or None, self._deadline)
+            self._session.wait_for(lambda: not is_held(name), self._deadline)
         return message
 
     def _call(self, name: str, service: str, kind: Any, request: Any, command: str) -> Any:
@@ -231,9 +231,7 @@ class Systems:
     def _wait_for_reports(self, names: Collection[str], deadline: Deadline) -> bool:
         """Wait for the reports of all systems; return whether all have arrived."""
         self.subscribe(names)
-        return bool(
-            self._session.wait_for(lambda: all(map(self._has_reported, names)) or None, deadline)
-        )
+        return self._session.wait_for(lambda: all(map(self._has_reported, names)), deadline)
 
     def _no_response_error(self, name: str) -> NoResponseError:
         if name in self._other_versions:

@@ -138,9 +138,9 @@ class NodeServices:
         new = set(self._systems.discover()) - self._awaited  # wait for each manager only once
         limit = deadline.at_most(REPORT_WITHIN_S)
 
-        def have_reported() -> bool | None:
+        def have_reported() -> bool:
             reports = self._systems.current()
-            return all(reports[name] or self._systems.other_version(name) for name in new) or None
+            return all(reports[name] or self._systems.other_version(name) for name in new)
 
         self._session.wait_for(have_reported, limit)
         self._awaited |= new
