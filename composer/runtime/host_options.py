@@ -12,6 +12,11 @@ from composer.model.qos import QosProfile
 from composer.runtime.clock import COMPUTER, Clock
 
 R = TypeVar("R")
+#: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
+_SHORTEST_START_LIMIT_S = 5.0
+#: A phase that has a time limit and takes that much longer hangs: C code may hold the GIL forever,
+#: and then nothing in Python can end it. The last plan of a phase may be slow.
+_HANGS_AFTER_S = 60.0
 
 
 class Target(Protocol):
@@ -95,13 +100,6 @@ class HostOptions:
     member_command: Sequence[str] = ()
     instruments: Instruments | None = None
     recorder: Recorder | None = None
-
-
-#: Joining the ROS graph takes a tenth of a second, on a busy machine some tenths.
-_SHORTEST_START_LIMIT_S = 5.0
-#: A phase that has a time limit and takes that much longer hangs: C code may hold the GIL forever,
-#: and then nothing in Python can end it. The last plan of a phase may be slow.
-_HANGS_AFTER_S = 60.0
 
 
 class TimeLimits:

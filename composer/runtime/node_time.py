@@ -35,6 +35,15 @@ from composer.runtime.executors.sources import Taken
 from composer.runtime.metrics.repeat_limit import RepeatLimit
 
 NANOSECONDS = 1_000_000_000
+#: As rclpy and rclcpp subscribe: only the latest time matters.
+_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_WARNING_PERIOD_S = 10.0
+#: In ROS, zero means that no time was received yet.
+UNKNOWN = Time(clock_type=ClockType.ROS_TIME)
+#: Called with each new time; must be fast and must not raise.
+Follower: TypeAlias = Callable[[Time], None]
+#: As often as simulators do by default.
+_CLOCK_PERIOD_S = 0.01
 
 
 class SimTimer(ScheduledCall):
@@ -116,16 +125,6 @@ class SimTimers:
                 self._waiting.reschedule(timer)
 
 
-#: As rclpy and rclcpp subscribe: only the latest time matters.
-_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_WARNING_PERIOD_S = 10.0
-#: In ROS, zero means that no time was received yet.
-UNKNOWN = Time(clock_type=ClockType.ROS_TIME)
-
-#: Called with each new time; must be fast and must not raise.
-Follower: TypeAlias = Callable[[Time], None]
-
-
 class SimTimeSource:
     """Passes the time of /clock to its followers. It subscribes only while there are any."""
 
@@ -180,10 +179,6 @@ class SimTimeSource:
             self._now = now
             for follower in self._followers:
                 follower(now)
-
-
-#: As often as simulators do by default.
-_CLOCK_PERIOD_S = 0.01
 
 
 def publish_clock(node: Node, loop: Loop) -> None:

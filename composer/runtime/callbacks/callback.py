@@ -33,6 +33,9 @@ HOT_HZ = 1000.0
 _HOT_WEIGHT = 16
 #: Minimum time between two warnings about the same callback.
 WARNING_PERIOD_S = 5.0
+_LAST = BATCH_SIZE - 1  # the call that completes a batch
+#: The message for a handler without an argument.
+EMPTY: Final = object()
 
 
 class CallbackTimer:
@@ -187,11 +190,6 @@ class _Stopwatch:
     def leave(self) -> None:
         """End a step."""
         self.total_s += self._monotonic() - self._began_s
-
-
-_LAST = BATCH_SIZE - 1  # the call that completes a batch
-#: The message for a handler without an argument.
-EMPTY: Final = object()
 
 
 class Callback(CallbackTimer):

@@ -32,6 +32,9 @@ from composer.runtime.metrics.statistics import ChainStatistics
 
 _MAX_IN_TRANSIT = 256  # messages from one node to the next; beyond, the oldest are forgotten
 _REMEMBERED = 32  # messages per node
+T = TypeVar("T")
+#: Called with (the callback, what it did).
+Report = Callable[[str, str], None]
 
 
 class Hop:
@@ -109,12 +112,6 @@ class Chains:
     def of(self, node: Node) -> NodeChains:
         """Return the hops of a node."""
         return NodeChains(tuple(self._hops.get(node.name.value, ())))
-
-
-T = TypeVar("T")
-
-#: Called with (the callback, what it did).
-Report = Callable[[str, str], None]
 
 
 class _Snapshot:

@@ -12,6 +12,13 @@ from composer.model import Reaction
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.ros.messages import Build, compile_message
 
+#: The characters and items of a state variable. A reaction that appends to its own state, such as
+#: the text of each message, would otherwise use up the memory.
+MAX_STATE_SIZE = 1_000_000
+#: The publisher and client ports of a node, by name.
+Publishers: TypeAlias = Mapping[str, Publisher[Any]]
+Action: TypeAlias = Callable[[dict[str, Any]], None]
+
 
 class ReactionClient(Protocol):
     """A client or action client port, through which a reaction sends requests and goals."""
@@ -31,14 +38,7 @@ class MessageReaction(Protocol):
         """Run it."""
 
 
-#: The characters and items of a state variable. A reaction that appends to its own state, such as
-#: the text of each message, would otherwise use up the memory.
-MAX_STATE_SIZE = 1_000_000
-
-#: The publisher and client ports of a node, by name.
-Publishers: TypeAlias = Mapping[str, Publisher[Any]]
 Clients: TypeAlias = Mapping[str, ReactionClient]
-Action: TypeAlias = Callable[[dict[str, Any]], None]
 
 
 class RunningReaction:

@@ -31,6 +31,19 @@ from composer.runtime.process.computer import PortState, is_own_address, port_st
 from composer.runtime.process.instance_lock import open_private
 
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
+_PROGRAM = "fast-discovery-server"
+_PROFILE = Path(__file__).with_name("discovery_server.xml")
+#: The lease in the profile, and the time until clients have noticed its end.
+RESTART_DELAY_S = 6.0
+#: A server that was idle for so long has passed on that the nodes have left. If it ends earlier,
+#: clients may not discover the nodes of the next start: see docs/decisions/0011-fast-dds.md.
+_IDLE_S = 0.2
+_IDLE_WITHIN_S = 1.0
+_POLL_S = 0.02
+_ENDS_WITHIN_S = 1.0
+_KILLED_WITHIN_S = 0.5
+#: Receives the level, the logger and the text of a line.
+Write = Callable[[LogLevel, str, str], None]
 
 
 class ServerRecord:
@@ -92,22 +105,6 @@ def _open(name: str) -> TextIO | None:
 
 def _this_boot() -> str:
     return _BOOT.read_text(encoding="ascii")
-
-
-_PROGRAM = "fast-discovery-server"
-_PROFILE = Path(__file__).with_name("discovery_server.xml")
-#: The lease in the profile, and the time until clients have noticed its end.
-RESTART_DELAY_S = 6.0
-#: A server that was idle for so long has passed on that the nodes have left. If it ends earlier,
-#: clients may not discover the nodes of the next start: see docs/decisions/0011-fast-dds.md.
-_IDLE_S = 0.2
-_IDLE_WITHIN_S = 1.0
-_POLL_S = 0.02
-_ENDS_WITHIN_S = 1.0
-_KILLED_WITHIN_S = 0.5
-
-#: Receives the level, the logger and the text of a line.
-Write = Callable[[LogLevel, str, str], None]
 
 
 def _sleep_until(until_s: float) -> bool:

@@ -31,6 +31,22 @@ from composer.runtime.executors import readiness
 from composer.runtime.executors.base_loop import BaseLoop
 from composer.runtime.executors.readiness import EntitySource, SetCallback
 
+#: The attributes of an action client with the requests that wait for each kind of response.
+_PENDING = {
+    "goal": "_pending_goal_requests",
+    "cancel": "_pending_cancel_requests",
+    "result": "_pending_result_requests",
+}
+#: An early response is tried again after a millisecond, then after twice as long each time: on a
+#: busy machine, the thread that registers its request may not run for a while.
+_RETRY_AFTER_S = 0.001
+LAST_RETRY_AFTER_S = 2.0
+#: Ended goals whose status rcl keeps publishing, so that late subscribers see it.
+KEPT_STATUSES = 10
+#: Results that are kept for clients of other processes, and for how long, as by rclpy.
+KEPT_RESULTS = 1000
+RESULT_TIMEOUT_S = 900.0
+
 
 @dataclass(frozen=True, slots=True)
 class _Role:
@@ -65,16 +81,6 @@ _CLIENT = _Role(
     ),
     "_is_status_ready",
 )
-#: The attributes of an action client with the requests that wait for each kind of response.
-_PENDING = {
-    "goal": "_pending_goal_requests",
-    "cancel": "_pending_cancel_requests",
-    "result": "_pending_result_requests",
-}
-#: An early response is tried again after a millisecond, then after twice as long each time: on a
-#: busy machine, the thread that registers its request may not run for a while.
-_RETRY_AFTER_S = 0.001
-LAST_RETRY_AFTER_S = 2.0
 
 
 class ActionSource(EntitySource):
@@ -193,13 +199,6 @@ def add_result_callback(server: Any, identity: bytes, respond: Callable[[Any], N
         respond(server.action_type.Impl.GetResultService.Response())
     else:
         future.add_done_callback(lambda done: respond(done.result()))
-
-
-#: Ended goals whose status rcl keeps publishing, so that late subscribers see it.
-KEPT_STATUSES = 10
-#: Results that are kept for clients of other processes, and for how long, as by rclpy.
-KEPT_RESULTS = 1000
-RESULT_TIMEOUT_S = 900.0
 
 
 class GoalServer(ActionServer):

@@ -18,6 +18,14 @@ from composer.runtime.executors.tasks import Report, Task, name_of
 from composer.runtime.executors.tracebacks import format_stacks
 
 _SWEEP_SIZE = 64  # entries at which canceled calls are removed
+T = TypeVar("T")
+_WAITS: dict[int, _Wait] = {}  # by the identifiers of the threads that wait
+#: After this time without a wait, a loop sleeps for :data:`YIELD_S`. Polling releases the
+#: interpreter's lock and takes it back before a waiting thread is awake. That thread counts it as
+#: a switch and does not request the lock: without the sleep it starves for seconds.
+BUSY_S = 0.005
+YIELD_S = 5e-5  # enough for another thread to wake up
+PAUSE_AFTER_FAULT_S = 0.01  # a permanent fault must not fill the log within a second
 
 
 class ScheduledCall:
@@ -151,9 +159,6 @@ class TimerQueue(Generic[C]):
         self._sweep_at = max(_SWEEP_SIZE, 2 * len(self._entries))
 
 
-T = TypeVar("T")
-
-
 class _Wait:
     """A wait of a thread in :meth:`BaseLoop.wait`, and the exception that has ended it."""
 
@@ -164,9 +169,6 @@ class _Wait:
         self.interrupted_by: type[BaseException] | None = None
 
 
-_WAITS: dict[int, _Wait] = {}  # by the identifiers of the threads that wait
-
-
 def end_wait(thread: int, kind: type[BaseException]) -> bool:
     """Raise ``kind`` in a thread that waits for a loop; return false if it does not wait."""
     wait = _WAITS.get(thread)
@@ -175,14 +177,6 @@ def end_wait(thread: int, kind: type[BaseException]) -> bool:
     wait.interrupted_by = kind
     wait.event.set()
     return True
-
-
-#: After this time without a wait, a loop sleeps for :data:`YIELD_S`. Polling releases the
-#: interpreter's lock and takes it back before a waiting thread is awake. That thread counts it as
-#: a switch and does not request the lock: without the sleep it starves for seconds.
-BUSY_S = 0.005
-YIELD_S = 5e-5  # enough for another thread to wake up
-PAUSE_AFTER_FAULT_S = 0.01  # a permanent fault must not fill the log within a second
 
 
 class BaseLoop(ABC):

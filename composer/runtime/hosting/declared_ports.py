@@ -15,16 +15,17 @@ from composer.model.qos import PRESETS, QosProfile
 from composer.runtime.callbacks.context import NodeContext
 from composer.runtime.ros.conversions import own_profile
 
+#: Created by rclpy for every node, or by the composer.
+OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})
+#: How rcl names the channel of a remapping rule.
+_SCHEMES = {ChannelKind.TOPIC: "rostopic", ChannelKind.SERVICE: "rosservice"}
+
 
 class HostingError(TransitionFailed):
     """A class cannot be hosted; the text says why, and what to do instead.
 
     It fails the transition, without a traceback: the reason is not a mistake in the class.
     """
-
-
-#: Created by rclpy for every node, or by the composer.
-OF_EVERY_NODE = frozenset({"/rosout", "/parameter_events", "/clock"})
 
 
 def interface_name(interface: Any) -> str:
@@ -123,10 +124,6 @@ def _difference(declared: QosProfile, actual: QosProfile) -> str:
         f"{name} is {getattr(actual, name)}, declared as {getattr(declared, name)}"
         for name in different
     )
-
-
-#: How rcl names the channel of a remapping rule.
-_SCHEMES = {ChannelKind.TOPIC: "rostopic", ChannelKind.SERVICE: "rosservice"}
 
 
 def remapping_arguments(node: Node) -> list[str]:

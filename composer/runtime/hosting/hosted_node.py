@@ -51,6 +51,7 @@ from composer.runtime.ports import PortSet
 _THREAD_ENDS_WITHIN_S = 0.2
 #: A constructor or a handler of a transition is reported once it has run for so long.
 _BLOCKS_AFTER_S = 5.0
+_STATE_IDS = {"unconfigured": 1, "inactive": 2, "active": 3, "finalized": 4}
 
 
 class HostedNode(LocalNode):
@@ -283,9 +284,6 @@ def _end_as_by_signal(instance: Instance) -> None:
             handler(number, None)
     finally:
         gate.outgoing = False
-
-
-_STATE_IDS = {"unconfigured": 1, "inactive": 2, "active": 3, "finalized": 4}
 
 
 def missing_module(reference: BehaviorReference) -> str | None:

@@ -36,6 +36,18 @@ from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 from composer.runtime.ports import PortSet, RunningPort
 
 _LEVELS = {severity: level for level, severity in SEVERITIES.items()}
+#: How long ``rclpy.spin_once`` without a time waits: responses of clients do not end it.
+_SPINS_WITHIN_S = 0.05
+#: rclpy does not notify when a server appears.
+_POLL_PERIOD_S = 0.05
+#: The groups of rclpy. Classes derived from them are groups of a class's own.
+_GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
+_CALLBACKS = (
+    "_pre_set_parameters_callbacks",
+    "_on_set_parameters_callbacks",
+    "_post_set_parameters_callbacks",
+)
+_SHARED = ("_parameters", "_descriptors", *_CALLBACKS)
 
 
 class HostedLogger(RcutilsLogger):
@@ -108,14 +120,6 @@ class InstanceSettings:
 def is_reentrant(context: NodeContext) -> bool:
     """Return whether the callbacks of a callback group, by its context, may overlap."""
     return type(context.group) is ReentrantCallbackGroup
-
-
-#: How long ``rclpy.spin_once`` without a time waits: responses of clients do not end it.
-_SPINS_WITHIN_S = 0.05
-#: rclpy does not notify when a server appears.
-_POLL_PERIOD_S = 0.05
-#: The groups of rclpy. Classes derived from them are groups of a class's own.
-_GROUPS = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 
 
 class Instance:
@@ -318,14 +322,6 @@ def changed_parameters(node: Any, declared: Mapping[str, Parameter]) -> dict[str
         for name, parameter in declared.items()
         if name in present and present[name] is not parameter
     }
-
-
-_CALLBACKS = (
-    "_pre_set_parameters_callbacks",
-    "_on_set_parameters_callbacks",
-    "_post_set_parameters_callbacks",
-)
-_SHARED = ("_parameters", "_descriptors", *_CALLBACKS)
 
 
 class SharedState:

@@ -40,6 +40,8 @@ _PERIOD_S = 0.02
 _RETURN_WITHIN_S = 0.2
 #: Packages that create tasks for their own functions. These call code of the class as such.
 _OTHERS = frozenset({"composer", "rclpy"})
+#: Another thread must not begin a callback between the two questions about one.
+_ASKING = threading.Lock()
 
 
 class _Current(threading.local):
@@ -106,10 +108,6 @@ class UserFunction:
     def is_one(self, instance: Instance, function: UserFunction | None) -> bool:
         """Return whether this is ``function``; without it, any one of ``instance``."""
         return self.instance is instance and function in (None, self)
-
-
-#: Another thread must not begin a callback between the two questions about one.
-_ASKING = threading.Lock()
 
 
 class PermittedFunction(UserFunction):

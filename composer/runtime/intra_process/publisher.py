@@ -17,6 +17,9 @@ from composer.runtime.host_options import Target
 from composer.runtime.intra_process.dds_flags import MATCH_FLAG, MATCHING
 from composer.runtime.intra_process.lifecycle_gate import LifecycleGate
 
+_IMMUTABLE = frozenset({int, float, bool, str, bytes})
+_COPIES: dict[type, Callable[[Any], Any]] = {array: lambda value: value[:], ndarray: ndarray.copy}
+
 
 class FanOut:
     """Puts each message to several targets."""
@@ -118,10 +121,6 @@ class GatedPublisher:
         if isinstance(message, bytes):
             return deserialize_message(message, self.message_type)
         raise TypeError(f"Expected {self.message_type}, got {type(message)}")
-
-
-_IMMUTABLE = frozenset({int, float, bool, str, bytes})
-_COPIES: dict[type, Callable[[Any], Any]] = {array: lambda value: value[:], ndarray: ndarray.copy}
 
 
 def copy_of(message: Any) -> Any:

@@ -48,6 +48,8 @@ _ENDINGS_NOT_BY_PORTS = (
 
 #: A topic, service or action by kind and full name.
 ChannelKey: TypeAlias = tuple[ChannelKind, str]
+S = TypeVar("S")
+Remove = Callable[[], None]
 
 
 def channel_of(port: Port) -> ChannelKey:
@@ -109,11 +111,6 @@ def _is_timed(profile: QosProfile) -> bool:
         or profile.liveliness is not Liveliness.AUTOMATIC
         or profile.liveliness_lease_duration_ms is not None
     )
-
-
-S = TypeVar("S")
-
-Remove = Callable[[], None]
 
 
 class LocalRouter:

@@ -25,6 +25,9 @@ from composer.runtime.intra_process.publisher import copy_of
 
 CallSoon = Callable[[Callable[[], object]], None]
 Receive = Callable[[Any, Any], None]
+Spawn = Callable[[Coroutine[Any, Any, Any]], Future[Any]]
+OnFeedback = Callable[[Any], None]
+_IDS = random.Random()  # noqa: S311 - they identify, and protect nothing
 
 
 class LocalService:
@@ -96,10 +99,6 @@ class _LocalReply:
         future = self._waiting()
         if future is not None:
             future.set_exception(error)
-
-
-Spawn = Callable[[Coroutine[Any, Any, Any]], Future[Any]]
-OnFeedback = Callable[[Any], None]
 
 
 class LocalActionServer:
@@ -189,9 +188,6 @@ class LocalGoal:
     def cancel_goal_async(self) -> Future[Any]:
         """Request cancellation."""
         return self.server.cancel(self)
-
-
-_IDS = random.Random()  # noqa: S311 - they identify, and protect nothing
 
 
 def use_seed(seed: int) -> None:

@@ -36,6 +36,8 @@ from composer.runtime.intra_process.publisher import (
 
 #: A message at the very end of a period is in time, whatever the rounding of both.
 _TOLERANCE_S = 1e-6
+#: Called with the time of the last message, by the clock of the loop.
+OnOverdue = Callable[[float], None]
 
 
 class Receiver(Target, Protocol):
@@ -43,10 +45,6 @@ class Receiver(Target, Protocol):
 
     def close(self) -> None:
         """Receive nothing more."""
-
-
-#: Called with the time of the last message, by the clock of the loop.
-OnOverdue = Callable[[float], None]
 
 
 class Overdue(Target):

@@ -44,6 +44,11 @@ _POLL_S = 0.02
 _MAX_ENDPOINTS = 20_000
 #: The bytes of a participant's prefix that Fast DDS derives from the computer.
 _HOST = slice(2, 4)
+#: Commands wait a little longer. A node that hangs does not answer.
+_PARAMETERS_WITHIN_S = 0.4
+#: Parameters, array items and characters in one answer: writing it as JSON holds the GIL. Larger
+#: values are left to the parameter services.
+_MAX_ITEMS = 20_000
 
 
 class GraphObserver:
@@ -160,13 +165,6 @@ class GraphObserver:
     def _count_local(self, known: frozenset[bytes]) -> int:
         """Return how many of the participants are on this computer."""
         return sum(prefix[_HOST] == self._own_host for prefix in known)
-
-
-#: Commands wait a little longer. A node that hangs does not answer.
-_PARAMETERS_WITHIN_S = 0.4
-#: Parameters, array items and characters in one answer: writing it as JSON holds the GIL. Larger
-#: values are left to the parameter services.
-_MAX_ITEMS = 20_000
 
 
 class ManagerQueries:

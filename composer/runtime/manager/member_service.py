@@ -50,6 +50,10 @@ _LIFECYCLE_SERVICES: Mapping[str, Any] = {
     "get_available_transitions": GetAvailableTransitions,
     "change_state": ChangeState,
 }
+_MAX_LISTED = 3
+_TRANSITIONS = (*DONE_IN, CREATE)
+_CONFIGURE, _SHUTDOWN = "configure", "shutdown"
+T = TypeVar("T")
 
 
 async def answer_calls(request: CallNodes, nodes: Mapping[str, ManagedNode]) -> NodeResponses:
@@ -93,11 +97,6 @@ async def _lifecycle_response(node: ManagedNode, request: Any) -> Any:
         for label, number in node.lifecycle.available.items()
     ]
     return GetAvailableTransitions.Response(available_transitions=transitions)
-
-
-_MAX_LISTED = 3
-_TRANSITIONS = (*DONE_IN, CREATE)
-_CONFIGURE, _SHUTDOWN = "configure", "shutdown"
 
 
 @dataclass(slots=True)
@@ -221,9 +220,6 @@ class MemberService:
             reason = "" if outcome.success else outcome.reason
             step.result = StepResult(outcome.success, reason, self._reports.number)
         return step.result
-
-
-T = TypeVar("T")
 
 
 class ReceivedSteps(Generic[T]):

@@ -54,6 +54,17 @@ _NODE_FIELDS = tuple(
     if field.name not in ("node", "since_s", "starts_active", "is_required", "is_optional")
 )
 _CALLBACK_FIELDS = [field.name for field in fields(CallbackFigures)]
+_DIAGNOSTICS = "/diagnostics"
+_NS_PER_S = 10**9
+_LONGEST_PERIOD_S = 1.0
+#: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
+#: several milliseconds, so changes then wait longer: messages take at most 2 % of the time. While
+#: more changes follow, they wait for half a second.
+_BATCH_S = 0.05
+_LONGEST_BATCH_S = 0.5
+_MAX_SHARE = 0.02
+#: The coordinating process gives up a process whose reports are missing, after this time at most.
+_OUTDATED_S = REPORTS_WITHIN_S + 1.0
 
 
 def diagnostic_array(
@@ -158,21 +169,6 @@ def _text(value: Any) -> str:
     if isinstance(value, tuple):
         return " ".join(item if isinstance(item, str) else "{}={}".format(*item) for item in value)
     return "" if value is None else str(value)
-
-
-_DIAGNOSTICS = "/diagnostics"
-_NS_PER_S = 10**9
-_LONGEST_PERIOD_S = 1.0
-#: Changes within this time, as in a bring-up, become one message. With many nodes, a message costs
-#: several milliseconds, so changes then wait longer: messages take at most 2 % of the time. While
-#: more changes follow, they wait for half a second.
-_BATCH_S = 0.05
-_LONGEST_BATCH_S = 0.5
-_MAX_SHARE = 0.02
-
-
-#: The coordinating process gives up a process whose reports are missing, after this time at most.
-_OUTDATED_S = REPORTS_WITHIN_S + 1.0
 
 
 class ReportTimes:

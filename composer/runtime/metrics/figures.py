@@ -9,6 +9,16 @@ from composer.base.fast_dataclass import dataclass
 from composer.runtime.metrics.statistics import CallbackStatistics, ChainStatistics
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
+#: Messages that are closer than this count as one burst.
+_BURST_S = 0.1
+#: A current rate counts the messages of the last seconds.
+_WINDOW_S = 3.0
+#: Messages have stopped after this many times the length of the window.
+_SILENT_PERIODS = 3
+_MS = 1e3
+#: Reports about changes of state are closer to the last one, too close to measure rates.
+_APART_S = 0.5
+
 
 @dataclass(slots=True)
 class _Burst:
@@ -19,14 +29,6 @@ class _Burst:
     messages: int = 1
     received: int = 1
     size_bytes: int = 0
-
-
-#: Messages that are closer than this count as one burst.
-_BURST_S = 0.1
-#: A current rate counts the messages of the last seconds.
-_WINDOW_S = 3.0
-#: Messages have stopped after this many times the length of the window.
-_SILENT_PERIODS = 3
 
 
 class MessageRate:
@@ -110,11 +112,6 @@ class CountedRate:
     def current_hz(self, now_s: float) -> float | None:
         """Return the rate of the last seconds, 0 once messages have stopped; None if not known."""
         return self._rate.current_hz(now_s)
-
-
-_MS = 1e3
-#: Reports about changes of state are closer to the last one, too close to measure rates.
-_APART_S = 0.5
 
 
 def figures(node: str, statistics: CallbackStatistics) -> CallbackFigures:

@@ -17,6 +17,8 @@ _SHORTEST_S = 1e-7
 _LONGEST_S = 100.0
 #: Each bucket is a fifth longer than the one before: a percentile is right within 10 %.
 _GROWTH = 1.2
+#: How many durations are added to the buckets together.
+BATCH_SIZE = 256
 
 
 def _bounds() -> Iterable[float]:
@@ -28,9 +30,6 @@ def _bounds() -> Iterable[float]:
 
 #: The bounds of buckets, in seconds: bucket ``i`` ends at ``BOUNDS_S[i]``; the last is unbounded.
 BOUNDS_S = tuple(_bounds())
-
-#: How many durations are added to the buckets together.
-BATCH_SIZE = 256
 
 
 class Histogram:

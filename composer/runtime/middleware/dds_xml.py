@@ -56,6 +56,19 @@ _USED = f"""
   </userTransports>
 </rtps>
 """
+_UNUSED = "'interfaces' of the system are not used"
+#: With others, rmw_fastrtps replaces the transports of a profile.
+_RANGES = ("", "SUBNET", "SYSTEM_DEFAULT")
+_PEERS_VARIABLE = "ROS_STATIC_PEERS"
+#: With it, rmw_fastrtps sets up the transports in a way that a profile cannot express.
+_DEPRECATED_VARIABLE = "ROS_LOCALHOST_ONLY"
+#: The limit of Fast DDS without a profile.
+_MESSAGE_BYTES = 65_500
+#: What rmw_fastrtps sets for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: a profile with that variable
+#: would have two shared memory transports. See fast_dds_commands_localhost.xml.
+_PARTICIPANTS_ON_LOCALHOST = 32
+_NO_MULTICAST = "<metatrafficUnicastLocatorList><locator/></metatrafficUnicastLocatorList>"
+_PEER = "<locator><udpv4><address>{}</address></udpv4></locator>"
 
 
 class Profile:
@@ -128,11 +141,6 @@ def _parse(text: str) -> Element:
     return ElementTree.fromstring(text)  # noqa: S314 - a text of ours
 
 
-_UNUSED = "'interfaces' of the system are not used"
-#: With others, rmw_fastrtps replaces the transports of a profile.
-_RANGES = ("", "SUBNET", "SYSTEM_DEFAULT")
-
-
 def use_interfaces(discovery: Discovery, environment: MutableMapping[str, str]) -> list[str]:
     """Select a profile for the network interfaces of a system, which has some.
 
@@ -184,18 +192,6 @@ def announce_less_often(environment: MutableMapping[str, str]) -> None:
         with suppress(OSError):
             content = without(environment[PROFILES_VARIABLE], "leaseAnnouncement")
             environment[PROFILES_VARIABLE] = str(save_profile(content))
-
-
-_PEERS_VARIABLE = "ROS_STATIC_PEERS"
-#: With it, rmw_fastrtps sets up the transports in a way that a profile cannot express.
-_DEPRECATED_VARIABLE = "ROS_LOCALHOST_ONLY"
-#: The limit of Fast DDS without a profile.
-_MESSAGE_BYTES = 65_500
-#: What rmw_fastrtps sets for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: a profile with that variable
-#: would have two shared memory transports. See fast_dds_commands_localhost.xml.
-_PARTICIPANTS_ON_LOCALHOST = 32
-_NO_MULTICAST = "<metatrafficUnicastLocatorList><locator/></metatrafficUnicastLocatorList>"
-_PEER = "<locator><udpv4><address>{}</address></udpv4></locator>"
 
 
 def segment_for_large_messages(

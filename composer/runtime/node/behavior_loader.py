@@ -38,6 +38,8 @@ _LOCK = threading.RLock()
 _folders: dict[str, tuple[Path, ...]] = {}
 #: The importers of the executed files, by the names of their modules.
 _importers: dict[str, _Importer] = {}
+#: A method of a behavior.
+Method = Callable[..., Any]
 
 
 def import_module(module: str, base: Path, folders: Sequence[Path]) -> ModuleType:
@@ -162,10 +164,6 @@ def _is_module(folder: Path, parts: Sequence[str]) -> bool:
     return len(parts) > 1 and (
         path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
     )
-
-
-#: A method of a behavior.
-Method = Callable[..., Any]
 
 
 class BehaviorLoadError(Exception):

@@ -59,6 +59,7 @@ _EVENTS = {
     "deactivate": Event.DEACTIVATE,
     "cleanup": Event.CLEANUP,
 }
+P = TypeVar("P", bound=RunningPort)
 
 
 class WrongReturn(Exception):
@@ -221,9 +222,6 @@ class RunningNode(LocalNode):
             rest = self._context.call("on_parameters", handler, changes)
             if rest is not None:
                 self._context.spawn(self._context.strand.wrap(rest))
-
-
-P = TypeVar("P", bound=RunningPort)
 
 
 class NodeEntities(PortSet):

@@ -21,6 +21,9 @@ from composer.runtime.node_time import SimTimeSource
 from composer.runtime.ros.service_requests import limit_type_descriptions
 from composer.runtime.transforms.listener import TransformListeners
 
+#: rmw's profile of parameter events.
+_EVENTS_PROFILE = QosProfile(depth=1000)
+
 
 @dataclass(frozen=True, slots=True)
 class ProcessContext:
@@ -48,10 +51,6 @@ class NodeOptions(ManagedContext):
     seen_messages: MessageSnapshots | None
     make_library_node: Callable[[Any], Any]
     instruments: Instruments | None
-
-
-#: rmw's profile of parameter events.
-_EVENTS_PROFILE = QosProfile(depth=1000)
 
 
 class _NoPublisher:

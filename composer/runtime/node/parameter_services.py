@@ -55,6 +55,7 @@ PARAMETER_SERVICES: Mapping[str, Any] = {
 }
 #: Other callbacks of the loop run after this time.
 _SLICE_S = 1e-3
+_TYPES = frozenset(kind.value for kind in Parameter.Type)
 
 
 class UnknownParameterError(Exception):
@@ -217,9 +218,6 @@ def _parameter(message: ParameterMessage) -> Parameter:
 
 def _refusal(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=False, reason=reason)
-
-
-_TYPES = frozenset(kind.value for kind in Parameter.Type)
 
 
 def provide_logger_services(node: Node, clock: Clock, warn: Callable[[str], None]) -> None:

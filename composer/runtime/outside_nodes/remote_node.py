@@ -25,6 +25,20 @@ _PARAMETER_EVENTS = "/parameter_events"  # each node has a publisher of its own
 _COMMON_TOPICS = ("/rosout", _PARAMETER_EVENTS)
 #: The service that every action server has.
 _SEND_GOAL = "/_action/send_goal"
+#: An answer that a server sends before it has discovered the client is lost.
+_ASK_AGAIN_S = 1.0
+_POLL_S = 0.02
+_EVENTS_DEPTH = 20
+_CONFIRMED_WITHIN_S = 5.0
+#: The states of a node in another process of the system in which each transition has nothing to do:
+#: a process that ran before the coordinating one keeps its nodes as they are.
+DONE_IN = {
+    "configure": ("inactive", "active"),
+    "activate": ("active",),
+    "deactivate": ("inactive", "unconfigured", "finalized"),
+    "cleanup": ("unconfigured", "finalized"),
+    "shutdown": ("finalized",),
+}
 
 
 class NodePresence:
@@ -124,22 +138,6 @@ class NodePresence:
                 return servers_of(self._manager, name + _SEND_GOAL)
             case PortKind.ACTION_CLIENT:
                 return clients_of(self._manager, name + _SEND_GOAL)
-
-
-#: An answer that a server sends before it has discovered the client is lost.
-_ASK_AGAIN_S = 1.0
-_POLL_S = 0.02
-_EVENTS_DEPTH = 20
-_CONFIRMED_WITHIN_S = 5.0
-#: The states of a node in another process of the system in which each transition has nothing to do:
-#: a process that ran before the coordinating one keeps its nodes as they are.
-DONE_IN = {
-    "configure": ("inactive", "active"),
-    "activate": ("active",),
-    "deactivate": ("inactive", "unconfigured", "finalized"),
-    "cleanup": ("unconfigured", "finalized"),
-    "shutdown": ("finalized",),
-}
 
 
 class NotAnswered(Exception):

@@ -35,6 +35,7 @@ END_SHARE = 0.5
 _KILLED_WITHIN_S = 1.0
 #: How long after the first node of a program its other ones are in the graph, usually.
 _ALL_NODES_WITHIN_S = 1.0
+T = TypeVar("T")
 
 
 class Run(Protocol):
@@ -46,7 +47,6 @@ class Run(Protocol):
 
 
 R = TypeVar("R", bound=Run)
-T = TypeVar("T")
 
 
 class Ended(Exception):

@@ -15,6 +15,9 @@ from composer.runtime.executors.tasks import wait_for
 from composer.runtime.executors.tracebacks import calls_user_code, is_closing, shown, text_of
 from composer.runtime.ports import RunningPort
 
+#: Maximum time for handlers to end their goals once the node leaves *active*.
+CANCEL_LIMIT_S = 1.0
+
 
 class ServedGoal(Goal[Any, Any], Protocol):
     """A goal, as its server sees it."""
@@ -35,9 +38,6 @@ class ServedGoal(Goal[Any, Any], Protocol):
 
 
 G = TypeVar("G", bound=ServedGoal)
-
-#: Maximum time for handlers to end their goals once the node leaves *active*.
-CANCEL_LIMIT_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,12 @@ from composer.runtime.metrics.statistics import CallbackStatistics
 
 #: From this depth on, popping the first item of a list is slow: it moves all others.
 _DEEP = 256
+#: Messages, the oldest first. Every method is atomic.
+MessageQueue: TypeAlias = "list[Any] | _DeepQueue"
+#: The queue and turn of a mailbox, and other objects that are used when a message is handled.
+Prefetched = tuple[
+    MessageQueue, Callable[[], object], object, object, object, object, object, object, object
+]
 
 
 class _DeepQueue(deque[Any]):
@@ -27,10 +33,6 @@ class _DeepQueue(deque[Any]):
         return self.popleft()
 
 
-#: Messages, the oldest first. Every method is atomic.
-MessageQueue: TypeAlias = "list[Any] | _DeepQueue"
-
-
 def message_queue(depth: float) -> MessageQueue:
     """Return a queue for up to about ``depth`` messages.
 
@@ -38,12 +40,6 @@ def message_queue(depth: float) -> MessageQueue:
     separate block for 64 messages: one more cache miss per message in a large system.
     """
     return [] if depth < _DEEP else _DeepQueue()
-
-
-#: The queue and turn of a mailbox, and other objects that are used when a message is handled.
-Prefetched = tuple[
-    MessageQueue, Callable[[], object], object, object, object, object, object, object, object
-]
 
 
 class MailboxOwner(Protocol):

@@ -40,6 +40,22 @@ _CHECKS = 20
 _MAX_REPORTED = 100  # other nodes can be started without end
 #: Minimum time between two warnings about the same event.
 WARNING_PERIOD_S = 10.0
+_DEADLINE_MISSED = "deadline_missed"
+_LIVELINESS_LOST = "liveliness_lost"
+_LIVELINESS_CHANGED = "liveliness_changed"
+_PUBLISHER = QoSPublisherEventType
+_SUBSCRIPTION = QoSSubscriptionEventType
+#: Events about endpoints that do not match, which occur when they are discovered.
+_INCOMPATIBLE = {
+    PortKind.PUBLISHER: (
+        _PUBLISHER.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS,
+        _PUBLISHER.RCL_PUBLISHER_INCOMPATIBLE_TYPE,
+    ),
+    PortKind.SUBSCRIPTION: (
+        _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
+        _SUBSCRIPTION.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE,
+    ),
+}
 
 
 class IncompatibleQos:
@@ -99,24 +115,6 @@ class IncompatibleQos:
             here, there = (offered, requested) if self._is_publisher else (requested, offered)
             policy, reason = incompatibility.policy, incompatibility.reason
             yield f"{topic}: {policy} is {there} there, {here} here; {reason}"
-
-
-_DEADLINE_MISSED = "deadline_missed"
-_LIVELINESS_LOST = "liveliness_lost"
-_LIVELINESS_CHANGED = "liveliness_changed"
-_PUBLISHER = QoSPublisherEventType
-_SUBSCRIPTION = QoSSubscriptionEventType
-#: Events about endpoints that do not match, which occur when they are discovered.
-_INCOMPATIBLE = {
-    PortKind.PUBLISHER: (
-        _PUBLISHER.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS,
-        _PUBLISHER.RCL_PUBLISHER_INCOMPATIBLE_TYPE,
-    ),
-    PortKind.SUBSCRIPTION: (
-        _SUBSCRIPTION.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
-        _SUBSCRIPTION.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE,
-    ),
-}
 
 
 @dataclass(frozen=True, slots=True)

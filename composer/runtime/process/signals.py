@@ -18,6 +18,8 @@ from composer.runtime.process.watchdog import STOP_SIGNALS
 _MILLISECONDS = 1000
 _LONGEST_MS = 2**31 - 1  # the longest timeout of poll(2): 24 days
 _READ_BYTES = 65536
+_VARIABLE = "NOTIFY_SOCKET"
+READY, STOPPING, ALIVE = "READY=1", "STOPPING=1", "WATCHDOG=1"
 
 
 class WakeupSocket:
@@ -107,10 +109,6 @@ def stop_signals(
         signal.set_wakeup_fd(fd_before)
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if ends_process else handler)
-
-
-_VARIABLE = "NOTIFY_SOCKET"
-READY, STOPPING, ALIVE = "READY=1", "STOPPING=1", "WATCHDOG=1"
 
 
 class ServiceManager:

@@ -32,6 +32,8 @@ NameAndTypes: TypeAlias = tuple[str, tuple[str, ...]]
 KINDS = ("node", "topic", "service", "action")
 #: The sorted names of all nodes, topics, services and actions, including hidden ones.
 GraphView: TypeAlias = Mapping[str, tuple[NameAndTypes, ...]]
+#: A step that creates a finalized node again, which is unconfigured then.
+CREATE = "create"
 
 
 def visible_names(names: Iterable[NameAndTypes]) -> tuple[NameAndTypes, ...]:
@@ -185,10 +187,6 @@ class CallNodes:
 
     calls: tuple[NodeCall, ...]
     Answer: ClassVar = NodeResponses
-
-
-#: A step that creates a finalized node again, which is unconfigured then.
-CREATE = "create"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,10 @@ from composer.plan.drift import ObservedEndpoint
 from composer.runtime.ros.conversions import discovered_profile
 from composer.runtime.ros.graph import PARTICIPANT_BYTES, UNKNOWN_NODE, NodeName, RosGraph
 
+#: The order of endpoints of a node.
+_ORDER = {kind: number for number, kind in enumerate(PortKind)}
+_Ends: TypeAlias = dict[str, list[ObservedEndpoint]]
+
 
 @dataclass(frozen=True, slots=True)
 class EndpointInfo:
@@ -142,12 +146,6 @@ def details(graph: RosGraph, kind: str, name: str, types: tuple[str, ...]) -> di
 def _split(full_name: str) -> NodeName:
     namespace, name = split_node_name(full_name)
     return name, namespace
-
-
-#: The order of endpoints of a node.
-_ORDER = {kind: number for number, kind in enumerate(PortKind)}
-
-_Ends: TypeAlias = dict[str, list[ObservedEndpoint]]
 
 
 def endpoints(graph: RosGraph) -> tuple[tuple[str, tuple[ObservedEndpoint, ...]], ...]:

@@ -14,6 +14,15 @@ from composer.model import LogLevel
 from composer.runtime.clock import Clock
 from composer.runtime.protocol.reports import CallbackFigures, ChainFigures
 
+Event: TypeAlias = (
+    "Logged | StateChanged | NodeTransitionFailed | RollingBack | RolledBack | BroughtUp"
+    " | NodeFailed | Restarted | Commanded | CallbackFailed | Stopping | Stuck"
+)
+Report: TypeAlias = Callable[[Event], None]
+P = ParamSpec("P")
+#: The counters of a :class:`NodeSummary`.
+COUNTERS = ("received", "sent", "calls", "dropped", "skipped", "errors")
+
 
 @dataclass(frozen=True, slots=True)
 class StateChanged:
@@ -194,14 +203,6 @@ class Logged:
         return f"[{self.elapsed_s:.3f}] [{self.level.upper()}] [{self.logger}] {self.message}"
 
 
-Event: TypeAlias = (
-    "Logged | StateChanged | NodeTransitionFailed | RollingBack | RolledBack | BroughtUp"
-    " | NodeFailed | Restarted | Commanded | CallbackFailed | Stopping | Stuck"
-)
-Report: TypeAlias = Callable[[Event], None]
-P = ParamSpec("P")
-
-
 class Reporter:
     """Passes events to a listener, one at a time, from any thread.
 
@@ -242,10 +243,6 @@ class Reporter:
     def log(self, level: LogLevel, logger: str, message: str) -> None:
         """Report a line of the log."""
         self.report(Logged, logger, level, message)
-
-
-#: The counters of a :class:`NodeSummary`.
-COUNTERS = ("received", "sent", "calls", "dropped", "skipped", "errors")
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,8 @@ BLOCKS_AFTER_S = 5.0
 _RETURNS_WITHIN_S = 1.0
 #: A hung loop has recovered once all its callbacks are younger than this.
 _RECOVERED_WITHIN_S = 0.5
+#: A node and how often it had become active.
+_Activation = tuple[ManagedNode, int]
 
 
 @dataclass(slots=True)
@@ -204,10 +206,6 @@ def _limit_s(callback: RunningCallback, node: ManagedNode) -> float:
         return node.transition_timeout_s + _TRANSITION_MARGIN_S
     limit = node.model.supervision.watch.callback_ms
     return math.inf if limit is None else limit.value / 1000.0
-
-
-#: A node and how often it had become active.
-_Activation = tuple[ManagedNode, int]
 
 
 @dataclass(slots=True)

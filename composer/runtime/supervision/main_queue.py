@@ -33,6 +33,8 @@ if TYPE_CHECKING:  # tests of the supervision run without ROS
 _URGENT_S = 0.05
 #: The states of a node that is down: an error in a handler also ends in one of these.
 DOWN = (PrimaryState.UNCONFIGURED, FINALIZED)
+T = TypeVar("T")
+K = TypeVar("K")
 
 
 class SharedDesiredState:
@@ -57,10 +59,6 @@ class SharedDesiredState:
         with self._lock:
             self._value = change(self._value)
             return self._value
-
-
-T = TypeVar("T")
-K = TypeVar("K")
 
 
 @dataclass(frozen=True, slots=True)

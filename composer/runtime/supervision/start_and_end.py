@@ -33,6 +33,11 @@ STARTED_REPORT_WITHIN_S = 5.0
 #: A process that certainly runs is discovered and reports within this time, on a busy machine.
 _RUNNING_REPORT_WITHIN_S = 30.0
 _POLL_S = 0.02
+#: The longest share of the time for the tear-down that one step may take.
+_STEP_SHARE = 0.7
+_URGENT_S = 0.2
+#: This many nodes can be destroyed one by one within half a second.
+_FEW_NODES = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +108,6 @@ class SystemStart:
         self.supervisor.set_goals(goals, serial, activity)
         self.context.status.set_activity(activity)
         self.supervisor.reconciler.reconcile_settled("goal under the earlier coordinating process")
-
-
-#: The longest share of the time for the tear-down that one step may take.
-_STEP_SHARE = 0.7
-_URGENT_S = 0.2
-#: This many nodes can be destroyed one by one within half a second.
-_FEW_NODES = 20
 
 
 class SystemEnd:

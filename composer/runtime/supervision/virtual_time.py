@@ -50,6 +50,9 @@ _ENDED_AFTER, _IDLE_S = 60, 0.01
 #: Code of debuggers, which wait for the user.
 _DEBUGGERS = ("bdb.py", "pydevd.py")
 _NANOSECONDS = 1_000_000_000
+_FUTURE = "'await' on a future"
+_NOW = "self.clock.now()"
+_SLEEP = "await self.clock.sleep(seconds)"
 
 
 def check_virtual_time(system: System) -> None:
@@ -262,9 +265,6 @@ def _wait(instance: Instance, event: threading.Event, timeout: float | None = No
     return event.is_set() or instance.wait(event, timeout)
 
 
-_FUTURE = "'await' on a future"
-_NOW = "self.clock.now()"
-_SLEEP = "await self.clock.sleep(seconds)"
 _OUTSIDE = (
     _Outside("time.time", _NOW, replacement=lambda instance: _clock(instance).time()),
     _Outside("time.time_ns", _NOW, replacement=lambda instance: _clock(instance).time_ns()),

@@ -20,6 +20,7 @@ from composer.model.transforms import IDENTITY, Transform, compose, interpolate,
 
 #: As in tf2.
 HISTORY_NS = 10_000_000_000
+_NANOSECONDS = 1e9
 
 
 class Sample(NamedTuple):
@@ -111,9 +112,6 @@ class DynamicHistory:
         if times[0] < before_ns:
             count = bisect_left(times, before_ns)
             del times[:count], self._samples[:count]
-
-
-_NANOSECONDS = 1e9
 
 
 class Found(NamedTuple):

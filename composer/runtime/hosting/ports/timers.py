@@ -21,6 +21,8 @@ from composer.runtime.hosting.user_code import call_in_group
 from composer.runtime.ports.timer import TimerPort
 
 _NANOSECONDS = 1e9
+#: rclpy accepts a period of zero, which calls as often as possible.
+_SHORTEST_MS = 0.001
 
 
 class HostedTimer(Timer):
@@ -174,10 +176,6 @@ class HostedRate(Rate):
             self._instance.wait(self._event)
         finally:
             self._postsleep()
-
-
-#: rclpy accepts a period of zero, which calls as often as possible.
-_SHORTEST_MS = 0.001
 
 
 class HostedGuardCondition(GuardCondition):
