@@ -1,4 +1,4 @@
-"""``compose test``: runs that hang or crash, repetitions, JUnit XML, pytest, and exploration."""
+"""``compose test``: runs that hang or crash, repetitions, JUnit XML, and exploration."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from tests.ros.scenarios.conftest import compose_in
 
 CRASHING = """\
 import os
+import threading
 
 from composer.behavior import Behavior
 
@@ -29,8 +30,7 @@ class Crashing(Behavior):
 
 class Hanging(Behavior):
     def on_tick(self) -> None:
-        while True:
-            pass
+        threading.Event().wait()
 """
 UNSEEDED = """\
 import os
@@ -43,13 +43,6 @@ class Unseeded(Behavior):
         self.log.info(os.urandom(8).hex())
 """
 SYSTEM = "system: s\nnodes: {bad: {behavior: 'bad:NAME', timers: {tick: {rate_hz: 10}}}}\n"
-
-
-def _command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", *arguments]
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 def _write(folder: Path, name: str, text: str) -> None:
@@ -65,8 +58,16 @@ def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
         _write(tmp_path, f"{name}.yaml", SYSTEM.replace("NAME", name))
         scenario = f"scenario: {name}\nsystem: ../{name}.yaml\nfor_s: 1\n"
         _write(tmp_path, f"scenarios/{name}\n[FATAL] [compose] \udcff\x1b.yaml", scenario)
-    words = ("--timeout", "3", "-j2", "--junit", "out/j.xml", "--bag-on-failure")
-    done = _command(tmp_path, "composer", "test", *words)
+    words = ("test", "--timeout", "3", "-j2", "--junit", "out/j.xml", "--bag-on-failure")
+    # A new interpreter, because a fork of another one may not keep the output of its own forks.
+    done = subprocess.run(
+        [sys.executable, "-m", "composer", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
     assert done.returncode == 1
     [suite] = JUnitXml.fromfile(str(tmp_path / "out" / "j.xml"))
     crashed, hung = (case.result[0] for case in suite)
@@ -86,7 +87,7 @@ def test_a_run_that_ends_by_itself_or_never(tmp_path: Path) -> None:
         assert open_bag(folder / name).warnings
 
 
-def test_repetitions_and_pytest(tmp_path: Path) -> None:
+def test_repetitions(tmp_path: Path) -> None:
     _write(tmp_path, "s.yaml", "system: s\nnodes: {a: {on_activate: {log: 'a< & é'}}}\n")
     _write(tmp_path, "scenarios/a.yaml", "scenario: a\nsystem: ../s.yaml\nfor_s: 1\n")
     wrong = "scenario: wrong\nsystem: ../s.yaml\nfor_s: 1\nexpect: [{log: 'b<'}]\n"
@@ -100,9 +101,6 @@ def test_repetitions_and_pytest(tmp_path: Path) -> None:
     assert "scenarios/wrong.yaml:4:16" in done.stdout
     [suite] = JUnitXml.fromfile(str(tmp_path / "j.xml"))
     assert (suite.tests, suite.failures, suite.errors) == (6, 3, 0)
-    done = _command(tmp_path, "pytest", "-p", "no:cacheprovider")
-    assert "1 failed, 2 passed" in done.stdout
-    assert "a line 'b<' in the log" in done.stdout
 
 
 #: ``brake`` computes a speed from the distances at its last two calls. It is right as long as
@@ -179,14 +177,16 @@ def test_a_race_is_found_and_can_be_repeated(tmp_path: Path) -> None:
     paths = [tmp_path / "scenarios" / f"{number}.yaml" for number in range(len(RACES))]
     for path, bounds in zip(paths, RACES, strict=True):
         path.write_text(SCENARIO.replace("BOUNDS", bounds))
-    explored = compose_in(tmp_path, "test", "--explore", "20", "--seed", "4").stdout
-    again = compose_in(tmp_path, "test", "--explore", "20", "--seed", "4", str(paths[-1])).stdout
+    # With this seed, few variations precede the smallest one.
+    words = ("test", "--explore", "6", "--seed", "3")
+    explored = compose_in(tmp_path, *words).stdout
+    again = compose_in(tmp_path, *words, paths[-1]).stdout
     reports = explored.split("race failed\n")[1:]
     assert again.split("race failed\n")[1] == reports[-1]
     for path, report, text in zip(paths, reports, RACES.values(), strict=True):
         assert report.startswith(f"it fails with:\n    {text}\nto repeat it, add this")
         block = re.findall("^    (.*)\n", report.partition(" -->")[0], re.MULTILINE)[1:]
-        assert block[0] == "seed: 4"
+        assert block[0] == "seed: 3"
         path.write_text("\n".join([path.read_text(), *block]))
     seen = re.findall("seen: .*", explored)
     assert len(seen) == len(RACES)

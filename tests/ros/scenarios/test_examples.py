@@ -41,25 +41,28 @@ def test_every_example_has_a_scenario() -> None:
     assert {path.stem for path in SCENARIOS} == systems
 
 
-def passed_tests(folder: Path, *arguments: str) -> str:
-    """Run the tests of a project; return the last line of the output."""
+def output_of_tests(folder: Path, *arguments: str) -> list[str]:
+    """Run the tests of a project; return the lines of the output."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
     done = subprocess.run(
         command, cwd=folder, capture_output=True, text=True, check=False, timeout=150
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout.splitlines()[-1]
+    return done.stdout.splitlines() or [done.stderr]
 
 
-def test_the_tests_in_the_guide_pass(tmp_path: Path) -> None:
+def test_the_tests_in_the_guide_pass_and_a_scenario_fails(tmp_path: Path) -> None:
     guide = ROOT / "docs" / "guides" / "testing.md"
     files = FILE.findall(guide.read_text(encoding="utf-8"))
     assert len(files) == 5
-    (tmp_path / "composer.yaml").touch()
+    system = "system: s\nnodes: {a: {on_activate: {log: started}}}\n"
+    wrong = "scenario: wrong\nsystem: ../s.yaml\nfor_s: 1\nexpect: [{log: 'b<'}]\n"
+    files += [("composer.yaml", ""), ("s.yaml", system), ("scenarios/wrong.yaml", wrong)]
     for name, text in files:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
-    assert passed_tests(tmp_path, "--rootdir=.", "tests", "scenarios").startswith("4 passed")
+    output = output_of_tests(tmp_path, "--rootdir=.", "tests", "scenarios")
+    assert output[-1].startswith("1 failed, 4 passed"), output
+    assert "a line 'b<' in the log" in "\n".join(output)
 
 
 def test_the_tests_of_a_new_project_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,4 +70,5 @@ def test_the_tests_of_a_new_project_pass(tmp_path: Path, monkeypatch: pytest.Mon
     output_of("new", "project", "my_robot")
     monkeypatch.chdir(tmp_path / "my_robot")
     output_of("new", "node", "gripper")
-    assert passed_tests(tmp_path / "my_robot").startswith("4 passed")
+    output = output_of_tests(tmp_path / "my_robot")
+    assert output[-1].startswith("4 passed"), output

@@ -150,7 +150,7 @@ def test_step(step: str, tmp_path: Path) -> None:
 
 def _in_pipeline(project: Path, text: str) -> Result:
     path = project / "scenarios" / "test.yaml"
-    path.write_text(f"scenario: test\nsystem: pipeline\nfor_s: 5\n{text}")
+    path.write_text(f"scenario: test\nsystem: pipeline\nfor_s: 3\n{text}")
     return run(path)
 
 
