@@ -224,7 +224,7 @@ def test_a_dashboard_of_a_system_ends_with_it(ros_domain_id: int) -> None:
 
 
 def test_a_dashboard_of_a_killed_system_ends(ros_domain_id: int) -> None:
-    with RunningSystem("systems/talker_listener.yaml", "--dashboard", program=COMPOSE) as system:
+    with RunningSystem("systems/talker_listener.yaml", "--dashboard") as system:
         url = system.wait_for("dashboard: http").partition(": ")[2]
         system.process.send_signal(signal.SIGKILL)
         wait_until(lambda: not is_open(url))

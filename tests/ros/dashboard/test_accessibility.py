@@ -1,4 +1,4 @@
-"""Every view, for users of a keyboard, of a screen reader, and of a narrow screen."""
+"""Every view, for users of a keyboard, a screen reader and a narrow screen, and its pictures."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from composer.dashboard.web.app import VIEWS as ADDRESSES
+from composer.dashboard.web.app import file_of_page, index_of
 from tests.programs import require_package
+from tests.ros.support.dashboard import Dashboard
 from tests.ros.support.in_process import wait_until
 from tests.ros.support.pages import VIEWS, visit
+from tools.draw_dashboard import FOLDER, PICTURES, ROOT, take
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page, Route
+    from playwright.sync_api import Browser, Page, Route
 
 pytestmark = pytest.mark.browser
 PLANNER = "/planning/planner"
@@ -28,6 +32,7 @@ DETAILS = (
 )
 PACKAGES = Path(__file__).parents[2] / "browser"
 AXE = PACKAGES / "node_modules" / "axe-core" / "axe.min.js"
+LINK = re.compile(r'<link rel="modulepreload" href="/page/([^"]+)">')
 
 
 def test_a_view_is_busy_until_its_module_is_loaded(own_view: Page) -> None:
@@ -170,3 +175,31 @@ def test_no_view_is_wider_than_the_screen(width: int, view: Page) -> None:
             .map(element => element.outerHTML.slice(0, 80))"""
         )
         assert cut == [], path
+
+
+@pytest.mark.parametrize("view", ["", *ADDRESSES])
+def test_every_view_names_its_modules_so_that_they_are_loaded_at_once(view: str) -> None:
+    modules = LINK.findall(index_of(view).decode())
+    assert len(set(modules)) == len(modules)
+    assert {"main.js", "dom.js", "connection.js"} <= set(modules)
+    assert all(file_of_page(name).is_file() for name in modules)
+    assert ("graph/viewport.js" in modules) == (view in ("", "graph"))
+
+
+def test_the_guide_shows_every_picture_in_its_present_size() -> None:
+    guide = (ROOT / "docs" / "guides" / "dashboard.md").read_text(encoding="utf-8")
+    shown = re.findall(r"\(\.\./pictures/(dashboard-[\w.-]+)\)", guide)
+    assert sorted(shown) == sorted(picture.name for picture in PICTURES)
+    for picture in PICTURES:
+        head = (FOLDER / picture.name).read_bytes()[:24]  # a PNG begins with its size
+        assert head.startswith(b"\x89PNG")
+        size = tuple(int.from_bytes(head[at : at + 4], "big") for at in (16, 20))
+        assert size == (picture.width, picture.height)
+
+
+def test_all_pictures_can_be_taken(browser: Browser, server: Dashboard, tmp_path: Path) -> None:
+    address = server.address
+    take(browser, f"{address.origin}/?token={address.token}", tmp_path, plotted_s=0.0)
+    taken = {picture.name: (tmp_path / picture.name).stat().st_size for picture in PICTURES}
+    # An empty page is much smaller as a PNG.
+    assert min(taken.values()) > 20_000, taken

@@ -70,7 +70,7 @@ def test_a_picture_is_up_to_date(name: str) -> None:
 
 
 def test_all_pictures_are_generated_and_used() -> None:
-    # Pictures of the dashboard are PNGs: see tests/ros/dashboard/test_pictures.py.
+    # Pictures of the dashboard are PNGs: see tests/ros/dashboard/test_accessibility.py.
     files = {path.name for path in (ROOT / "docs" / "pictures").glob("*.svg")}
     # "editor-python.svg": see tests/language_server. "terminal.svg" shows the times of one run.
     assert files == {*PICTURES, "editor-python.svg", "terminal.svg"}
