@@ -45,7 +45,7 @@ def split(
         yield system, keys
 
 
-def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
+def test_from_an_unknown_host_to_a_running_system_and_its_end(tmp_path: Path) -> None:
     with split(tmp_path, "robot", trusted=False) as (system, keys):
         (robot,) = system.others
         path = str(system.path)
@@ -95,14 +95,32 @@ def test_from_an_unknown_host_to_a_running_system(tmp_path: Path) -> None:
             assert logged.count("[detector] looking") == 1
         assert is_late or "/camera finalized" in logged
 
-        options = ("content=photo", "--namespace", "/lab", "--log-level", "debug")
-        with system.up(*options) as up:  # whatever ends it, nothing is left
-            up.wait_for("/lab/camera active")
-            up.wait_for("] found photo")
-            commands = [words for words in system.all_processes() if "--process" in words]
-            assert all(" ".join(options) in words for words in commands)
-            up.kill()
-            wait_until(lambda: not system.all_processes(), "processes are left")
+        check_that_nothing_is_left_of_a_killed_command(system)
+        check_that_the_second_signal_ends_all_at_once(system)
+
+
+def check_that_nothing_is_left_of_a_killed_command(system: SplitSystem) -> None:
+    options = ("content=photo", "--namespace", "/lab", "--log-level", "debug")
+    with system.up(*options) as up:
+        up.wait_for("/lab/camera active")
+        up.wait_for("] found photo")
+        commands = [words for words in system.all_processes() if "--process" in words]
+        assert all(" ".join(options) in words for words in commands)
+        up.kill()
+        wait_until(lambda: not system.all_processes(), "processes are left")
+
+
+def check_that_the_second_signal_ends_all_at_once(system: SplitSystem) -> None:
+    with system.up() as up:
+        up.wait_for("3 of 3 nodes active")
+        system.others[0].cut()  # its processes cannot be ended
+        up.signal(signal.SIGINT)
+        up.wait_for("ran for ")  # and now it waits for the other computer
+        sent_s = time.monotonic()
+        up.signal(signal.SIGINT)
+        up.process.wait(PATIENCE_S)
+        assert time.monotonic() - sent_s < AT_ONCE_S
+        assert "Traceback" not in up.output
 
 
 HOSTILE = r"""#!/bin/sh
@@ -131,19 +149,6 @@ def test_a_host_whose_every_command_is_hostile(tmp_path: Path) -> None:
                 assert not any(line.startswith("[FATAL]") for line in output.splitlines()), output
                 assert "robot (root@10.77.0.2): " in output
                 assert len(output) < MOST_CHARACTERS
-
-
-def test_the_second_signal_ends_all_at_once(tmp_path: Path) -> None:
-    with split(tmp_path, "robot") as (system, _), system.up() as up:
-        up.wait_for("3 of 3 nodes active")
-        system.others[0].cut()  # its processes cannot be ended
-        up.signal(signal.SIGINT)
-        up.wait_for("ran for ")  # and now it waits for the other computer
-        sent_s = time.monotonic()
-        up.signal(signal.SIGINT)
-        up.process.wait(PATIENCE_S)
-        assert time.monotonic() - sent_s < AT_ONCE_S
-        assert "Traceback" not in up.output
 
 
 @pytest.mark.soak
