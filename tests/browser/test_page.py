@@ -37,6 +37,7 @@ def rendered(name: str) -> bytes:
     return render(graphs_of(name), Format.HTML)
 
 
+@functools.cache
 def graphs_of(name: str) -> list[Graph]:
     if name.startswith("fleet_"):
         system, diagnostics = fleet(int(name.removeprefix("fleet_")))
