@@ -150,9 +150,8 @@ def is_complete(diagram: dict[str, Any]) -> bool:
     )
 
 
-def test_the_pipeline_and_plain_nodes_are_drawn(tmp_path: Path) -> None:
-    with hand_written("hand_written.py"), running(tmp_path / "log.txt", "pipeline") as run:
-        run.wait_for("3 of 3 nodes active")
+def test_the_pipeline_and_plain_nodes_are_drawn(pipeline: Running) -> None:
+    with hand_written("hand_written.py"):
         diagrams: list[dict[str, Any]] = []
 
         def fits() -> bool:
