@@ -61,7 +61,7 @@ def _replayed(bag: Path, **settings: float) -> Replay:
 
 
 @pytest.mark.parametrize(
-    "runs", [10, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+    "runs", [5, pytest.param(50, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
 )
 def test_the_commands_are_the_same_each_time(recorded: Path, runs: int) -> None:
     golden = open_bag(recorded)
