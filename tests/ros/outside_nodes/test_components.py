@@ -130,6 +130,15 @@ ODD = (
 def test_failed_loads_say_why_and_leave_nothing(tmp_path: Path, peer: Peer) -> None:
     nodes = [
         f"""
+  driver: {{executable: {{command: [{sys.executable}, {DRIVER}]}}}}
+  elsewhere:
+    required: false
+    component: {{package: demo, plugin: "demo::Talker", ready_timeout_ms: 500}}
+    container: driver
+"""
+    ]
+    nodes += [
+        f"""
   odd_{number}:
     required: false
     component: {{package: demo, {component}, ready_timeout_ms: 5000}}
@@ -145,28 +154,16 @@ def test_failed_loads_say_why_and_leave_nothing(tmp_path: Path, peer: Peer) -> N
             assert reason.replace("ODD", name) in failed.reason
             assert len(failed.reason) < LONG
             wait_until(lambda name=name: system.node(name).state == "unconfigured", name)
+        failed = system.wait_for_failure("/robot/elsewhere")
+        assert "/robot/driver has no service /robot/driver/_container/load_node" in failed.reason
         assert loaded(peer) == ["/robot/odd_4"]  # for the next attempt, as a process is
-
-
-def test_a_node_that_does_not_load_components(tmp_path: Path) -> None:
-    text = robot(
-        "\n  talker:\n    container: container\n"
-        '    component: {package: demo, plugin: "demo::Talker", ready_timeout_ms: 500}\n'
-        "    required: false\n",
-        container=f"container: {{executable: {{command: [{sys.executable}, {DRIVER}]}}}}",
-    )
-    with running(text, tmp_path) as system:
-        failed = wait_until(lambda: failures(system, "/robot/talker"), "its fault")[0]
-        assert (
-            "/robot/container has no service /robot/container/_container/load_node" in failed.reason
-        )
 
 
 def test_a_container_may_be_slow_with_more_components_than_its_services_queue(
     tmp_path: Path, peer: Peer
 ) -> None:
-    """A service keeps ten requests, and drops the others without a word."""
-    names = [f"talker_{number:02}" for number in range(14)]
+    """A service keeps ten requests beside the one it answers, and drops the others silently."""
+    names = [f"talker_{number:02}" for number in range(12)]
     slow = TALKER.replace("demo::Talker", "demo::Slow\n      ready_timeout_ms: 60000")
     nodes = [slow.replace("  talker:", f"  {name}:") for name in names]
     options = HostOptions(stop_within_s=PATIENCE_S)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -23,6 +22,7 @@ from composer.runtime.supervision.events import (
     StateChanged,
 )
 from tests.ros.members.split_robot import alive, pid_of
+from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.in_process import Peer, running, wait_until
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
@@ -63,15 +63,9 @@ connections:
 
 def printed_by(*words: str) -> str:
     """Return what the driver prints about itself, started with ``words`` as ``ros2 run`` would."""
-    process = subprocess.Popen(
-        [sys.executable, PROGRAMS / "driver.py", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
+    process = ForkedProgram(PROGRAMS / "driver.py", *words)
     try:
-        assert process.stdout is not None
-        return process.stdout.readline().strip()
+        return next(line.strip() for line in process.stdout if line.startswith("I am "))
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60)
@@ -118,8 +112,31 @@ def services(peer: Peer) -> set[str]:
     return {name for name, _ in peer.node.get_service_names_and_types()}
 
 
-def test_kill_is_noticed_and_dependents_pause_until_the_restart(tmp_path: Path) -> None:
+def test_external_transitions_and_the_restart_of_killed_processes(
+    tmp_path: Path, peer: Peer
+) -> None:
     with running(ROBOT, tmp_path) as system:
+        pid = pid_of(system, "camera")
+        changes = len(system.states("/robot/camera"))
+        forged = peer.publisher(TransitionEvent, "/robot/camera/transition_event")
+        active = State(label="active")
+        for label in ("finalized", "unconfigured", "inactive", "no state"):
+            forged.publish(TransitionEvent(start_state=active, goal_state=State(label=label)))
+        assert peer.change("/robot/camera", "deactivate")
+        wait_until(lambda: system.states("/robot/camera")[changes:], "the report of the state")
+        # Events that the node does not confirm move nothing.
+        assert system.states("/robot/camera")[changes:] == ["/robot/camera inactive"]
+        assert peer.change("/robot/camera", "activate")
+        wait_until(lambda: system.node("camera").state == "active", "the state")
+        system.change("camera", "deactivate", "cleanup")
+        wait_until(lambda: not alive(pid), "the end of the process")
+        system.change("camera", "configure", "activate")
+        response = peer.call(GetState, "/robot/camera/get_state")
+        assert response.current_state.label == "active"
+        assert pid_of(system, "camera") != pid
+        assert not system.reported(NodeFailed)
+
+        # Dependents pause until a killed process is restarted.
         for number, name in enumerate(("driver", "camera"), 1):
             full_name = system.node(name).full_name
             os.kill(pid_of(system, name), signal.SIGKILL)
@@ -132,29 +149,6 @@ def test_kill_is_noticed_and_dependents_pause_until_the_restart(tmp_path: Path) 
                 wait_until(lambda node=node: system.node(node).state == "active", node)
             changes = system.states("/robot/listener")
             assert changes[-2:] == ["/robot/listener inactive", "/robot/listener active"]
-
-
-def test_external_transitions_of_a_managed_executable(tmp_path: Path, peer: Peer) -> None:
-    with running(ROBOT, tmp_path) as system:
-        pid = pid_of(system, "camera")
-        changes = len(system.states("/robot/camera"))
-        forged = peer.publisher(TransitionEvent, "/robot/camera/transition_event")
-        active = State(label="active")
-        for label in ("finalized", "unconfigured", "inactive", "no state"):
-            forged.publish(TransitionEvent(start_state=active, goal_state=State(label=label)))
-        assert peer.change("/robot/camera", "deactivate")
-        wait_until(lambda: system.node("camera").state == "inactive", "the state")
-        # Events that the node does not confirm move nothing.
-        assert system.states("/robot/camera")[changes:] == ["/robot/camera inactive"]
-        assert peer.change("/robot/camera", "activate")
-        wait_until(lambda: system.node("camera").state == "active", "the state")
-        system.change("camera", "deactivate", "cleanup")
-        wait_until(lambda: not alive(pid), "the end of the process")
-        system.change("camera", "configure", "activate")
-        response = peer.call(GetState, "/robot/camera/get_state")
-        assert response.current_state.label == "active"
-        assert pid_of(system, "camera") != pid
-        assert not system.reported(NodeFailed)
 
 
 def test_a_process_that_ignores_signals_is_killed_in_time(tmp_path: Path) -> None:
@@ -189,17 +183,6 @@ nodes:
     ("executable", "ports", "reason"),
     [
         ("{command: [sh, -c, exit 3]}", "", "activate failed: its process exited with status 3"),
-        (
-            f"{{command: {DRIVER}, ready_timeout_ms: 8000}}",
-            "publishers: {other: {type: std_msgs/msg/String, external: true}}",
-            "activate failed: it has no publisher /other after 8 s",
-        ),
-        (  # a program that names its node itself, as a launch file would
-            f"{{command: [sh, -c, '{sys.executable} {PROGRAMS / 'driver.py'} --ros-args"
-            " -r __node:=c -r __ns:=/a/b $@; true', sh], ready_timeout_ms: 8000}",
-            "",
-            "graph after 8 s; there is /a/b/c instead: write 'name: c' and 'namespace: /a/b'",
-        ),
         ("{command: [/nowhere/x]}", "", "configure failed: there is no program '/nowhere/x'"),
         (
             f"{{command: {MANAGED}, lifecycle: managed}}",
@@ -229,6 +212,29 @@ def test_failed_starts_are_rolled_back(
     assert reason in str(system.reported(RollingBack)[0])
     assert system.states("/first")[-2:] == ["/first unconfigured", "/first finalized"]
     assert not system.reported(BroughtUp)
+
+
+#: It names its node itself, as a launch file would.
+NAMED = (
+    f"[sh, -c, '{sys.executable} {PROGRAMS / 'driver.py'} --ros-args"
+    " -r __node:=c -r __ns:=/a/b $@; true', sh]"
+)
+
+
+def test_nodes_and_endpoints_that_do_not_appear_are_named(tmp_path: Path) -> None:
+    text = f"""
+system: robot
+nodes:
+  lacking:
+    executable: {{command: {DRIVER}, ready_timeout_ms: 8000}}
+    publishers: {{other: {{type: std_msgs/msg/String, external: true}}}}
+  named: {{executable: {{command: {NAMED}, ready_timeout_ms: 8000}}}}
+"""
+    with running(text, tmp_path) as system:
+        lacking, named = (system.wait_for_failure(node).reason for node in ("/lacking", "/named"))
+        assert lacking == "activate failed: it has no publisher /other after 8 s"
+        hint = "graph after 8 s; there is /a/b/c instead: write 'name: c' and 'namespace: /a/b'"
+        assert hint in named
 
 
 #: It exits with status 0 on SIGTERM, always.

@@ -17,11 +17,10 @@ from composer.runtime.host_options import HostOptions
 from composer.runtime.manager.other_instances import Instance
 from composer.runtime.supervision.events import BroughtUp, NodeFailed, RollingBack
 from tests.ros.support.external_processes import soon_missed
+from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.in_process import Peer, running, wait_until
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
-
-
 EXTERNAL = """
 system: robot
 nodes:
@@ -132,11 +131,8 @@ def test_an_absent_external_node_fails_a_bring_up_that_is_all_or_nothing(
 def test_a_refused_system_leaves_an_external_node_as_it_is(tmp_path: Path, peer: Peer) -> None:
     """Another computer runs the system already, with the same node."""
     text = "{system: robot, nodes: {some_managed_driver: {external: {lifecycle: managed}}}}"
-    driver, state = (
-        [sys.executable, PROGRAMS / "managed_driver.py"],
-        "/some_managed_driver/get_state",
-    )
-    with subprocess.Popen(driver, stderr=subprocess.DEVNULL) as process:
+    state = "/some_managed_driver/get_state"
+    with ForkedProgram(PROGRAMS / "managed_driver.py") as process:
         try:
             with running(text, tmp_path) as system:
                 assert peer.call(GetState, state).current_state.label == "active"
