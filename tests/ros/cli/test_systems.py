@@ -1,4 +1,4 @@
-"""Commands to running systems: ps, down, top, lifecycle."""
+"""Commands to running systems: run, ps, down and top, also of systems that do not answer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,10 +15,9 @@ from typing import Any
 import pytest
 
 from composer.runtime.process.instance_lock import local_systems
-from tests.ros.support.background import PLANNER, ROBOT, Robot, lifecycle_set, moved, set_fault
+from tests.ros.support.background import Robot, moved, refused, set_fault
 from tests.ros.support.commands import (
     COMPOSE,
-    compose,
     errors,
     expect_error,
     expect_errors,
@@ -29,14 +27,6 @@ from tests.ros.support.commands import (
     start,
 )
 from tests.ros.support.in_process import wait_until
-
-
-def refused(*arguments: object) -> str:
-    """Run a command that must fail; return its stderr."""
-    done = compose(*arguments)
-    assert done.returncode == 1, done.stdout + done.stderr
-    assert "composer/runtime" not in done.stderr  # no traceback, except one of user code
-    return done.stderr
 
 
 def on_a_terminal(*arguments: str) -> str:
@@ -50,31 +40,6 @@ def on_a_terminal(*arguments: str) -> str:
                 shown += part
     os.close(ours)
     return shown.decode()
-
-
-@pytest.fixture(autouse=True)
-def nothing_stays_running() -> Iterator[None]:
-    """End the systems that a failed test left in the background."""
-    yield
-    for pid in local_systems().values():
-        with suppress(ProcessLookupError, ValueError):
-            os.kill(int(pid), signal.SIGKILL)
-
-
-@pytest.fixture
-def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
-    file = tmp_path / "robot.yaml"
-    file.write_text(ROBOT, encoding="utf-8")
-    file.with_name("planner.py").write_text(PLANNER, encoding="utf-8")
-    return file
-
-
-@pytest.fixture
-def robot(path: Path) -> Iterator[Robot]:
-    running = Robot(path)
-    yield running
-    running.kill()
 
 
 def planner_in(text: str) -> dict[str, Any]:
@@ -149,105 +114,6 @@ def test_a_system_runs_in_the_background_until_down(robot: Robot) -> None:
     (log,) = (file for file in robot.log.parent.iterdir() if file.name != "compose")
     line = r"^\[20[-0-9]{8} [:0-9]{8}\.\d{3}\] \[INFO\] \[compose\] /fleet/planner active$"
     assert re.search(line, log.read_text(), re.MULTILINE)
-
-
-def test_commands_to_a_whole_system(robot: Robot) -> None:
-    def sent(verb: str, system: object) -> str:
-        return repeated_until(bool, "lifecycle", verb, system)
-
-    none, two = (f"/fleet/robot: {count} of 3 nodes active\n" for count in (0, 2))
-    assert refused("lifecycle", "pause", "zebra").endswith("\n  available: /fleet/robot\n")
-    assert sent("pause", "robot") == none
-    assert robot.states() == dict.fromkeys(robot.states(), "inactive")
-    assert sent("resume", "/fleet/robot") == two
-    assert sent("reset", robot.path) == none
-    assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
-
-    set_fault("configure")
-    failed = "compose: /fleet/robot did not come up: /fleet/planner"
-    cause = "configure failed: ValueError: no map"
-    refusal = refused("lifecycle", "startup", "robot", "--all-or-nothing")
-    assert refusal.startswith(f"{failed}: {cause}; rolled back")
-    assert robot.states() == dict.fromkeys(robot.states(), "unconfigured")
-    assert refused("lifecycle", "startup", "robot").startswith(
-        f"{failed} failed; 0 of 3 nodes active, /fleet/planner is isolated: {cause}\n"
-    )
-    set_fault("none")
-    assert sent("startup", "robot") == two
-    hint = refused("lifecycle", "startup", "rowbot").splitlines()[1]
-    assert hint == "  did you mean '/fleet/robot'?"
-
-
-def test_nodes_are_restarted_in_order_with_their_dependents(robot: Robot) -> None:
-    before = len(robot.messages("/fleet/motor active", robot.text.partition(" (")[0]))
-    assert repeated_until(bool, "lifecycle", "restart", "planner") == (
-        "/fleet/planner: restarted (2 of 3 nodes active)\n"
-    )
-    requested = "restart of /fleet/planner requested"
-    wait_until(lambda: len(robot.messages(requested)) >= before + 8, "the log of the restart")
-    assert robot.messages()[before:] == [
-        requested,
-        "/fleet/motor inactive",
-        "/fleet/planner inactive",
-        "/fleet/planner unconfigured",
-        "/fleet/planner inactive",
-        "/fleet/planner active",
-        "go",
-        "/fleet/motor active",
-    ]
-    moved("planner", "shutdown")
-    assert robot.states()["/fleet/planner"] == "finalized"
-    assert repeated_until(bool, "lifecycle", "restart", "*/planner", "camera") == (
-        "/fleet/planner, /fleet/camera: restarted (2 of 3 nodes active)\n"
-    )
-    assert robot.states()["/fleet/motor"] == "active"
-    assert robot.states()["/fleet/camera"] == "inactive"
-    set_fault("configure")
-    refusal = refused("lifecycle", "restart", "planner")
-    assert "/fleet/planner: the restart failed: /fleet/planner: configure failed: " in refusal
-    listed(("no map",), "logs", "planner", "--level", "error")
-    expect_error("did you mean '/fleet/planner'?", "lifecycle", "restart", "planer")
-    assert "no line of" not in output_of("logs", "-n", 3, "motor", "--since", "10m")
-
-
-def test_lifecycle_set_with_dependents_several_nodes_and_patterns(robot: Robot) -> None:
-    done = lifecycle_set("planner", "deactivate")
-    assert (done.returncode, done.stdout) == (0, "/fleet/planner: active -> inactive\n")
-    assert done.stderr == (
-        "note: active nodes depend on this: /fleet/motor; --dependents deactivates them first\n"
-    )
-    assert robot.states()["/fleet/motor"] == "active"
-    done = lifecycle_set("planner", "activate")
-    assert (done.returncode, done.stderr) == (0, "")
-    text = moved("planner", "--to", "unconfigured", "--dependents")
-    assert text.splitlines() == [
-        "/fleet/motor: active -> inactive",
-        "/fleet/planner: active -> unconfigured",
-    ]
-    text = moved("planner", "--to", "active", "--dependents")
-    assert text.splitlines() == [
-        "/fleet/planner: unconfigured -> active",
-        "/fleet/motor: inactive -> active",
-    ]
-
-    text = moved("motor", "planner", "deactivate")
-    assert text == "/fleet/motor: active -> inactive\n/fleet/planner: active -> inactive\n"
-    text = moved("/fleet/[mp]*", "--to", "active")
-    assert text == "/fleet/motor: inactive -> active\n/fleet/planner: inactive -> active\n"
-    moved("/fleet/[mp]*", "--to", "inactive")
-    done = lifecycle_set("camera", "planner", "cleanup")
-    assert done.returncode == 0
-    done = lifecycle_set("camera", "motor", "cleanup")
-    assert (done.returncode, done.stdout) == (1, "/fleet/motor: inactive -> unconfigured\n")
-    assert "'cleanup' is not possible: /fleet/camera is unconfigured" in done.stderr
-    assert "available transitions: configure, shutdown" in done.stderr
-    unknown = "there is no lifecycle node matching 'x*'"
-    expect_error(unknown, "lifecycle", "set", "x*", "cleanup")
-    moved("camera", "--to", "finalized")
-    final = "'active' cannot be reached: /fleet/camera is finalized"
-    expect_error(final, "lifecycle", "set", "camera", "--to", "active")
-    for arguments in (["motor"], ["--to", "active"]):
-        assert compose("lifecycle", "set", *arguments).returncode in (1, 2)
 
 
 def test_unresponsive_nodes_and_systems_are_reported_in_time(robot: Robot) -> None:

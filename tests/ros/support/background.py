@@ -90,3 +90,11 @@ def moved(*words: str) -> str:
     done = lifecycle_set(*words)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def refused(*arguments: object) -> str:
+    """Run a command that must fail; return its stderr."""
+    done = compose(*arguments)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "composer/runtime" not in done.stderr  # no traceback, except one of user code
+    return done.stderr
