@@ -48,36 +48,24 @@ def test_all_nodes_are_listed_with_their_states(client: LifecycleClient) -> None
     assert client.states(NODES) == dict.fromkeys(NODES, "unconfigured")
 
 
-@pytest.mark.parametrize(
-    ("name", "found"),
-    [
-        ("/planning/planner", "/planning/planner"),
-        ("arm", "/other/arm"),
-        ("planning/planner", "/planning/planner"),
-    ],
-)
-def test_a_node_is_found_by_its_full_name_or_last_part(
-    client: LifecycleClient, name: str, found: str
-) -> None:
-    assert client.find(name) == found
+#: Names that are not those of one node, and the hints.
+WRONG_NAMES = {
+    "planner": "use a full name: /other/planner, /planning/planner",  # ambiguous
+    "planer": r"did you mean '/(planning|other)/planner'\?",
+    "/planning/planer": r"did you mean '/(planning|other)/planner'\?",
+}
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("planner", "use a full name: /other/planner, /planning/planner"),  # ambiguous
-        ("planer", r"did you mean '/(planning|other)/planner'\?"),
-        ("/planning/planer", r"did you mean '/(planning|other)/planner'\?"),
-    ],
-)
-def test_a_name_that_is_not_that_of_one_node_is_an_error(
-    client: LifecycleClient, name: str, hint: str
-) -> None:
-    with pytest.raises(NotFoundError) as raised:
-        client.find(name)
-    matches = f"'{name}' matches more than one lifecycle node"
-    assert (matches in str(raised.value)) is (name == "planner")
-    assert re.fullmatch(hint, raised.value.hint)
+def test_a_node_is_found_by_its_full_name_or_last_part(client: LifecycleClient) -> None:
+    for name in ("/planning/planner", "planning/planner"):
+        assert client.find(name) == "/planning/planner"
+    assert client.find("arm") == "/other/arm"
+    for name, hint in WRONG_NAMES.items():
+        with pytest.raises(NotFoundError) as raised:
+            client.find(name)
+        matches = f"'{name}' matches more than one lifecycle node"
+        assert (matches in str(raised.value)) is (name == "planner")
+        assert re.fullmatch(hint, raised.value.hint)
 
 
 def test_a_transition(client: LifecycleClient) -> None:
@@ -105,9 +93,7 @@ def test_an_unavailable_transition_is_not_requested(
     assert peer.poll() is None
 
 
-def test_a_failed_transition_is_reported_with_the_state(
-    client: LifecycleClient,
-) -> None:
+def test_a_failed_transition_is_reported_with_the_state(client: LifecycleClient) -> None:
     with pytest.raises(TransitionError, match="'configure' of /other/arm failed") as raised:
         client.change_state("/other/arm", "configure")
     assert "it is unconfigured now" in str(raised.value)

@@ -109,6 +109,7 @@ def test_only_goals_below_the_state_take_a_node_down() -> None:
     assert lowered(robot("aiaua"), goals) == {"/sensor": "inactive", "/motor": "finalized"}
 
 
+#: States and goals, and the dependents that are still active.
 ACTIVE_DEPENDENTS = [
     ("aaaaa", {"/sensor": "inactive"}, "/motor /planner"),  # an inactive planner is enough
     ("aaaaa", {"/planner": "inactive"}, "/motor"),  # for the logger
@@ -117,15 +118,7 @@ ACTIVE_DEPENDENTS = [
     ("aiaia", {"/sensor": "inactive"}, ""),
     ("aaaaa", {"/planner": "inactive", "/motor": "inactive"}, ""),
 ]
-
-
-@pytest.mark.parametrize(("states", "goals", "dependents"), ACTIVE_DEPENDENTS)
-def test_active_dependents_come_in_reverse_order(
-    states: str, goals: dict[str, str], dependents: str
-) -> None:
-    assert active_dependents(robot(states), goals) == tuple(dependents.split())
-
-
+#: States and goals, and the dependents that may follow.
 INACTIVE_DEPENDENTS = [
     ("iiaii", {"/sensor": "active"}, "/planner /motor"),
     ("iiiii", {"/planner": "active"}, "/logger /motor"),
@@ -135,11 +128,11 @@ INACTIVE_DEPENDENTS = [
 ]
 
 
-@pytest.mark.parametrize(("states", "goals", "dependents"), INACTIVE_DEPENDENTS)
-def test_inactive_dependents_come_in_order_once_all_they_need_is_up(
-    states: str, goals: dict[str, str], dependents: str
-) -> None:
-    assert inactive_dependents(robot(states), goals) == tuple(dependents.split())
+def test_dependents_come_in_order_once_all_they_need_is_up_and_active_ones_in_reverse() -> None:
+    for states, goals, dependents in ACTIVE_DEPENDENTS:
+        assert active_dependents(robot(states), goals) == tuple(dependents.split())
+    for states, goals, dependents in INACTIVE_DEPENDENTS:
+        assert inactive_dependents(robot(states), goals) == tuple(dependents.split())
 
 
 QOS = QoSProfile(depth=10)
