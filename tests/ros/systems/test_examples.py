@@ -139,14 +139,6 @@ def is_active(external: ExternalNode, answers: list[Trigger.Response]) -> bool:
     return bool(answers[-1].success)
 
 
-def test_the_minimal_node_starts(external: ExternalNode) -> None:
-    with RunningSystem("systems/minimal.yaml") as system:
-        system.wait_for(r"minimal_node.*started")
-        external.wait_for_state("/minimal_node", "active")
-        code, _ = system.stop()
-    assert code == 0
-
-
 def test_messages_arrive_in_process_and_externally(external: ExternalNode) -> None:
     received = external.listen(String, "/chatter")
     with RunningSystem("systems/talker_listener.yaml") as system:
