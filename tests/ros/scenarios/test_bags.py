@@ -35,7 +35,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory, shared_domain_id: int) ->
 
 def _run(project: Path, text: str) -> Result:
     path = project / "scenarios" / "test.yaml"
-    path.write_text(f"scenario: test\nsystem: pipeline\nfor_s: 8\n{text}")
+    path.write_text(f"scenario: test\nsystem: pipeline\nfor_s: 4\n{text}")
     return run(path)
 
 
