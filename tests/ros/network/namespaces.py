@@ -12,10 +12,10 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,14 @@ _NOT_INHERITED = (
     "ROS_AUTOMATIC_DISCOVERY_RANGE",
     "ROS_DOMAIN_ID",
 )
+
+
+def wait_until(condition: Callable[[], object], what: str) -> None:
+    """Wait until a condition holds; fail with a text after a minute."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, what
+        time.sleep(0.1)  # poll: each look is a process
 
 
 def require_namespaces() -> None:
@@ -257,8 +265,6 @@ def network(names: Sequence[str], quality: Quality = PERFECT) -> Iterator[list[C
 
 def wait_for_links(computers: Sequence[Computer]) -> None:
     """Wait until all links forward packets."""
-    end_s = time.monotonic() + PATIENCE_S
     for computer in computers:
-        while "LOWER_UP" not in computer.check("ip", "link", "show", "dev", "eth0"):
-            assert time.monotonic() < end_s, f"no link to {computer.name}"
-            time.sleep(0.01)  # poll: nothing announces it
+        look = partial(computer.check, "ip", "link", "show", "dev", "eth0")
+        wait_until(lambda look=look: "LOWER_UP" in look(), f"no link to {computer.name}")

@@ -10,11 +10,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.ros.network.namespaces import Computer
+from tests.ros.network.namespaces import PATIENCE_S, Computer, wait_until
 from tests.ros.network.ssh_servers import SshKeys
 
 COMPOSE = (sys.executable, "-P", "-m", "composer")
-PATIENCE_S = 60.0
 #: On each computer, below what is private to it.
 WORKSPACE = "/run/robot"
 _DETECTOR = """
@@ -164,12 +163,3 @@ class UpOnHosts:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             self.lines.append(line.rstrip("\n"))
-
-
-def wait_until(condition: object, what: str) -> None:
-    """Wait until ``condition()`` is true."""
-    assert callable(condition)
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end_s, what
-        time.sleep(0.1)  # poll: each look is a process

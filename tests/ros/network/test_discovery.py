@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
 
-from tests.ros.network.namespaces import PATIENCE_S, Computer, network
+from tests.ros.network.namespaces import PATIENCE_S, Computer, network, wait_until
 from tests.ros.support.commands import PROGRAMS, Observer, observing
 
 COMPOSE = (sys.executable, "-m", "composer")
@@ -70,13 +69,6 @@ def observe(computer: Computer, topic: str, *nodes: str) -> AbstractContextManag
     return observing(topic, *nodes, environment=computer.environment(), prefix=prefix)
 
 
-def wait_for(text: str, log: Path) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while text not in log.read_text():
-        assert time.monotonic() < end_s, log.read_text()
-        time.sleep(0.02)  # poll: nothing announces changes of the file
-
-
 @pytest.mark.soak  # what one computer can show is in tests/ros/children
 def test_peers_discover_each_other(
     computers: list[Computer], write_system: Callable[..., Path]
@@ -105,8 +97,8 @@ def test_processes_of_two_computers_use_one_server(
     robot, base = computers
     path = write_system(f"{{kind: server, address: {robot.address}, start: true}}", HOSTS)
     with run(base, path, "--process", "vision") as of_base, run(robot, path) as log:
-        wait_for("2 of 2 nodes active", log)
-        wait_for("picture", log)
+        for text in ("2 of 2 nodes active", "picture"):
+            wait_until(lambda text=text: text in log.read_text(), text)
         # On each computer, commands know the server from the process that runs there.
         assert "/robot: running, 2 of 2 nodes active" in base.check(*COMPOSE, "ps", "robot")
         assert "data: picture" in base.check(*COMPOSE, "topic", "echo", "/image", "--once")
@@ -130,7 +122,7 @@ def test_ros_nodes_discover_each_other_by_multicast(plain_computers: list[Comput
     assert talker.stdout is not None
     assert "ready\n" in talker.stdout
     command = (sys.executable, "-m", "composer", "topic", "echo", "/lab/text", "--once")
-    assert "xxx" in base.check(*command)
+    wait_until(lambda: "xxx" in base.run(*command).stdout, "the topic is not discovered")
     # Shared memory would be a way around the network.
     assert "fastrtps_port" in robot.check("ls", "/dev/shm")
     assert "fastrtps_port" not in base.check("ls", "/dev/shm")
@@ -157,8 +149,6 @@ def test_a_link_can_be_cut_and_restored(plain_computers: list[Computer]) -> None
     robot.cut()
     assert not reaches()
     robot.join()
-    end_s = time.monotonic() + PATIENCE_S
-    while not reaches():
-        assert time.monotonic() < end_s
+    wait_until(reaches, "the link is not restored")
     robot.kill_all()
     listening.wait(PATIENCE_S)

@@ -10,8 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.ros.network.namespaces import PERFECT, Computer, Quality, network
-from tests.ros.network.split_system import PATIENCE_S, WORKSPACE, SplitSystem, wait_until
+from tests.ros.network.namespaces import (
+    PATIENCE_S,
+    PERFECT,
+    Computer,
+    Quality,
+    network,
+    wait_until,
+)
+from tests.ros.network.split_system import WORKSPACE, SplitSystem
 from tests.ros.network.ssh_servers import SshKeys
 from tests.ros.support.commands import code_of_end
 
