@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int32
 
 from composer.bags.reader import open_bag
-from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import PATIENCE_S, Dashboard, browser, dashboard
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.pages import allowed, expect_text, watched
@@ -35,13 +33,6 @@ def folder(tmp_path: Path) -> Path:
     (bags / "<b>cut" / "x").mkdir(parents=True)
     (bags / "<b>cut" / "a_0.mcap").write_bytes(b"cut")
     return tmp_path / "work"
-
-
-@pytest.fixture
-def talker(shared_domain_id: int) -> Iterator[None]:
-    """The node ``/lab/talker``."""
-    with hand_written("hand_written_talker.py"):
-        yield
 
 
 def _bags(page: sync_api.Page) -> list[str]:

@@ -23,7 +23,7 @@ from composer.dashboard.forms import Forms
 from composer.dashboard.ros_side import RosSide
 from composer.dashboard.web.server import WebSocketProtocol
 from composer.interfaces import Interfaces
-from tests.ros.dashboard.test_foxglove_limits import raw
+from tests.ros.dashboard.test_foxglove_limits import Unread, raw
 from tests.ros.support.commands import hand_written
 from tests.ros.support.dashboard import Dashboard
 from tests.ros.support.in_process import PATIENCE_S, wait_until
@@ -139,7 +139,8 @@ def test_a_client_that_does_not_read_delays_no_end(ros_domain_id: int) -> None:
         with raw(server.address, max_queue=1, close_timeout=0) as client:
             client.subscribe("/camera")
             client.wait(lambda: client.frames)
-            time.sleep(2.0)  # until the buffers of the operating system are full
+            unread = Unread(client.socket.socket)
+            wait_until(unread.is_full, "full buffers of the operating system")
             started_s = time.monotonic()
             server.process.send_signal(signal.SIGINT)
             assert server.process.wait(timeout=PATIENCE_S) == 0
