@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from sensor_msgs.msg import BatteryState, Image, JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Bool, Byte, ByteMultiArray, Float64, Header, Int8, String, UInt64
 
-from composer.client.messages.topics import RateWindow
+from composer.client.messages.topics import RateStatistics, RateWindow
 from composer.client.messages.values import InvalidValueError, build_message
 from composer.language.document import parse_bytes
 from composer.language.expressions import EvaluationError, compile_expression
@@ -87,16 +88,12 @@ def test_numbers_of_messages_need_not_be_finite() -> None:
         build_message("{sec: .nan}", Time, "the message")
 
 
-def test_a_whole_message_is_passed_unchanged() -> None:
+def test_a_whole_message_is_passed_unchanged_and_others_are_new_objects() -> None:
     received = Image(data=array("B", b"\x01\x02"), width=2)
     assert message("'{message}'", Image, message=received) is received
     assert message("{data: '{message.data}'}", Image, message=received).data == received.data
-
-
-def test_each_message_is_a_new_object() -> None:
     build = compile_message(template("{frame_id: map}"), Header, WHERE)
-    first = build({})
-    first.frame_id = "changed"
+    build({}).frame_id = "changed"
     assert build({}).frame_id == "map"
 
 
@@ -181,48 +178,39 @@ def test_only_packages_in_the_ament_index_are_imported(
     assert not imported.exists()
 
 
-def test_rate_statistics() -> None:
-    window = RateWindow(100)
-    for at_s in (10.0, 10.1, 10.2, 10.5):
+def rate_of(size: int, times_s: Iterable[float]) -> RateStatistics:
+    """Return what a window of this size measures in the end."""
+    window = RateWindow(size)
+    assert window.statistics() is None
+    for at_s in times_s:
         window.add(at_s)
     rate = window.statistics()
     assert rate is not None
+    return rate
+
+
+def test_rates() -> None:
+    rate = rate_of(100, (10.0, 10.1, 10.2, 10.5))
     assert rate.average_hz == pytest.approx(3 / 0.5)
     assert (rate.shortest_s, rate.longest_s) == (pytest.approx(0.1), pytest.approx(0.3))
     assert rate.deviation_s == pytest.approx(0.0942809)
     assert rate.window == 3
-
-
-def test_a_window_keeps_the_last_messages_and_too_few_have_no_statistics() -> None:
-    window = RateWindow(2)
-    assert window.statistics() is None
-    window.add(0.0)
-    assert window.statistics() is None
-    for at_s in (100.0, 100.5, 101.0):
-        window.add(at_s)
-    rate = window.statistics()
-    assert rate is not None
+    # A window keeps the last messages.
+    rate = rate_of(2, (0.0, 100.0, 100.5, 101.0))
     assert (rate.average_hz, rate.window) == (2.0, 2)
-
-
-@pytest.mark.parametrize("size", [1, 4, 7, 100])
-def test_bursts_have_the_rate_of_their_messages(size: int) -> None:
-    window = RateWindow(size)
-    for second in range(12):
-        for at_s in (second, second + 0.0004):
-            window.add(at_s)
-            rate = window.statistics()
-            assert (rate is None) == (second == 0)
-            assert rate is None or rate.average_hz == pytest.approx(2.0)
-
-
-def test_a_fast_topic_has_its_rate_with_a_small_window() -> None:
-    window = RateWindow(3)
-    for number in range(1000):
-        window.add(number / 1000)
-    rate = window.statistics()
-    assert rate is not None
+    rate = rate_of(3, (number / 1000 for number in range(1000)))
     assert (rate.average_hz, rate.window) == (pytest.approx(1000.0, rel=0.02), 3)
+
+
+def test_bursts_have_the_rate_of_their_messages() -> None:
+    for size in (1, 4, 7, 100):
+        window = RateWindow(size)
+        for second in range(12):
+            for at_s in (second, second + 0.0004):
+                window.add(at_s)
+                rate = window.statistics()
+                assert (rate is None) == (second == 0)
+                assert rate is None or rate.average_hz == pytest.approx(2.0)
 
 
 def odometry() -> Odometry:
