@@ -168,35 +168,33 @@ def test_the_space_key_pauses(tmp_path: Path) -> None:
     assert (process.returncode, output.endswith(b" messages\n")) == (0, True)
 
 
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        (("--topics", "/chit"), "no topic of the bag matches"),
-        (("--compare", "golden"), "--compare can only be used with SYSTEM"),
-        (("pipeline", "--loop"), "--loop can only be used without SYSTEM"),
-        (("--remap", "chat"), "--remap takes /OLD:=/NEW"),
-    ],
+#: Options of ``compose replay`` with a bag, and what is wrong.
+MISTAKES = {
+    ("--topics", "/chit"): "no topic of the bag matches",
+    ("--compare", "golden"): "--compare can only be used with SYSTEM",
+    ("pipeline", "--loop"): "--loop can only be used without SYSTEM",
+    ("--remap", "chat"): "--remap takes /OLD:=/NEW",
+}
+#: Topics and times that the ROS graph cannot have.
+IMPOSSIBLE = (
+    ("bad name!\x1b[31m", 1, "topic name '/bad name!\\x1b[31m' contains a space"),
+    ("/" + "x" * 3000, 1, "' has 3001 characters"),
+    ("/chat", 2**62, "from after 2038, which /clock cannot show"),
 )
-def test_mistakes(tmp_path: Path, options: tuple[str, ...], text: str) -> None:
-    done = compose("replay", _chat(tmp_path), *options)
-    assert done.returncode in {1, 2}
-    assert text in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("topic", "at_ns", "text"),
-    [
-        ("bad name!\x1b[31m", 1, "topic name '/bad name!\\x1b[31m' contains a space"),
-        ("/" + "x" * 3000, 1, "' has 3001 characters"),
-        ("/chat", 2**62, "from after 2038, which /clock cannot show"),
-    ],
-)
-def test_what_the_graph_cannot_have(tmp_path: Path, topic: str, at_ns: int, text: str) -> None:
-    writer = BagWriter(tmp_path / "bag")
-    writer.add_topic(BagTopic(topic, "std_msgs/msg/String"))
-    writer.write(BagMessage(topic, at_ns, at_ns, bytes(8)))
-    writer.close()
-    assert text in error("replay", tmp_path / "bag", "--clock")
+def test_mistakes(tmp_path: Path) -> None:
+    bag = _chat(tmp_path)
+    for options, text in MISTAKES.items():
+        done = compose("replay", bag, *options)
+        assert done.returncode in {1, 2}
+        assert text in done.stderr
+    for number, (topic, at_ns, text) in enumerate(IMPOSSIBLE):
+        writer = BagWriter(tmp_path / f"bag_{number}")
+        writer.add_topic(BagTopic(topic, "std_msgs/msg/String"))
+        writer.write(BagMessage(topic, at_ns, at_ns, bytes(8)))
+        writer.close()
+        assert text in error("replay", tmp_path / f"bag_{number}", "--clock")
 
 
 def test_a_type_that_is_not_installed_is_named(tmp_path: Path) -> None:
