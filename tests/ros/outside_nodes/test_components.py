@@ -162,7 +162,7 @@ def test_failed_loads_say_why_and_leave_nothing(tmp_path: Path, peer: Peer) -> N
 def test_a_container_may_be_slow_with_more_components_than_its_services_queue(
     tmp_path: Path, peer: Peer
 ) -> None:
-    """A service keeps ten requests beside the one it answers, and drops the others silently."""
+    """Next to the request that it answers, a service keeps ten, and drops the others silently."""
     names = [f"talker_{number:02}" for number in range(12)]
     slow = TALKER.replace("demo::Talker", "demo::Slow\n      ready_timeout_ms: 60000")
     nodes = [slow.replace("  talker:", f"  {name}:") for name in names]
