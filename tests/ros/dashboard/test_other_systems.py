@@ -37,9 +37,10 @@ from tests.ros.support.system_process import RunningSystem
 from tests.unit.support.fleets import fleet_text
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, ViewportSize
+    from playwright.sync_api import Browser, Page, ViewportSize
 
 pytestmark = pytest.mark.browser
+PHONE: ViewportSize = {"width": 390, "height": 844}
 SYSTEM = """
 system: dropping
 nodes:
@@ -244,22 +245,6 @@ def fleet(shared_domain_id: int, tmp_path_factory: pytest.TempPathFactory) -> It
             yield server
 
 
-def test_what_is_searched_for_is_brought_near(browser: Browser, fleet: Dashboard) -> None:
-    with opened(browser, fleet.address) as page:
-        page.wait_for_function(ALL_SHOWN)
-        page.keyboard.press("/")
-        page.keyboard.type("controller_14")
-        page.keyboard.press("Enter")
-        node = page.locator('.world [data-key="node:/area14/act/controller_14"]')
-        page.wait_for_url("**/area14/act/controller_14")
-
-        def is_near() -> bool:
-            box = node.bounding_box()
-            return box is not None and box["width"] > 60 and box["x"] + box["width"] < 1280
-
-        wait_until(is_near, "the node is near")
-
-
 #: Names of nodes whose text is shown, and the least height of their letters in pixels.
 NAMES = """() => {
     const shown = [...document.querySelectorAll(".world [data-kind=node]:not(.nameless) > text")]
@@ -277,27 +262,44 @@ NAMES = """() => {
 }"""
 
 
-@pytest.mark.parametrize(("width", "height", "whole"), [(1280, 800, 95), (390, 844, 0)])
-def test_names_can_be_read_at_once(
-    width: int, height: int, whole: int, browser: Browser, fleet: Dashboard
+def test_names_can_be_read_at_once_and_what_is_searched_for_is_brought_near(
+    browser: Browser, fleet: Dashboard
 ) -> None:
-    with opened(browser, fleet.address, viewport={"width": width, "height": height}) as page:
-        page.wait_for_function(ALL_SHOWN)
-        shown = page.evaluate(NAMES)
-        assert len(shown["names"]) >= 95
-        assert len({name for name in shown["names"] if "…" not in name}) >= whole
-        assert {"/area1", "/area14"} <= set(shown["areas"])
-        assert shown["least"] >= 11
-        assert shown["used"] > 0.7
-        assert not page.locator(".world [data-label]").first.is_visible()
-        for _ in range(9):
-            page.keyboard.press("+")
-        # Near, everything is as it is drawn.
-        page.locator(".picture:not(.far)").wait_for()
-        page.locator(".world [data-label]").first.wait_for()
-        page.keyboard.press("0")
-        page.locator(".picture.far").wait_for()
-        assert page.evaluate(NAMES)["names"] == shown["names"]
+    with opened(browser, fleet.address, viewport=PHONE) as page:
+        check_the_names(page, whole=0)
+    with opened(browser, fleet.address) as page:
+        check_the_names(page, whole=95)
+        page.keyboard.press("/")
+        page.keyboard.type("controller_14")
+        page.keyboard.press("Enter")
+        node = page.locator('.world [data-key="node:/area14/act/controller_14"]')
+        page.wait_for_url("**/area14/act/controller_14")
+
+        def is_near() -> bool:
+            box = node.bounding_box()
+            return box is not None and box["width"] > 60 and box["x"] + box["width"] < 1280
+
+        wait_until(is_near, "the node is near")
+
+
+def check_the_names(page: Page, whole: int) -> None:
+    """Check that names can be read from afar, as many ``whole``, and more when near."""
+    page.wait_for_function(ALL_SHOWN)
+    shown = page.evaluate(NAMES)
+    assert len(shown["names"]) >= 95
+    assert len({name for name in shown["names"] if "…" not in name}) >= whole
+    assert {"/area1", "/area14"} <= set(shown["areas"])
+    assert shown["least"] >= 11
+    assert shown["used"] > 0.7
+    assert not page.locator(".world [data-label]").first.is_visible()
+    for _ in range(9):
+        page.keyboard.press("+")
+    # Near, everything is as it is drawn.
+    page.locator(".picture:not(.far)").wait_for()
+    page.locator(".world [data-label]").first.wait_for()
+    page.keyboard.press("0")
+    page.locator(".picture.far").wait_for()
+    assert page.evaluate(NAMES)["names"] == shown["names"]
 
 
 DRIVERS = ("lidar", "imu", "camera", "odometry", "battery", "motor", "gripper", "bumper")
@@ -314,11 +316,7 @@ def test_on_a_phone_every_box_has_a_name(
     lines += [f"  {name}: {{lifecycle: {{depends_on: ['*_driver']}}}}" for name in OTHERS]
     path = tmp_path / "robot.yaml"
     path.write_text("\n".join(["system: robot", "nodes:", *lines, ""]), encoding="utf-8")
-    phone: ViewportSize = {"width": 390, "height": 844}
-    with (
-        dashboard(str(path)) as server,
-        opened(browser, server.address, viewport=phone) as page,
-    ):
+    with dashboard(str(path)) as server, opened(browser, server.address, viewport=PHONE) as page:
         visit(page, "/graph?view=lifecycle")
         page.locator(".picture.far").wait_for()
         assert page.evaluate(NAMELESS) == []
