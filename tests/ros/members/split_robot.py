@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 from composer.runtime.host_options import HostOptions
+from tests.ros.support.forked import ForkedCommand
 from tests.ros.support.in_process import PATIENCE_S, RunningSystem, running
 from tests.ros.support.system_process import write_system
 
@@ -36,6 +37,10 @@ nodes:
     subscriptions: {found: {type: std_msgs/msg/String, qos: command, log: "{message.data}"}}
     lifecycle: {depends_on: [detector]}
 """
+#: The camera is in the process that coordinates the other one, which takes less to start.
+TWO_PROCESSES = TEXT.replace(
+    "  sensing: {nodes: [camera], cpus: [0], environment: {ROLE: sensing}}\n", ""
+)
 DETECTOR = """
 import time
 from composer.behavior import Behavior
@@ -69,19 +74,9 @@ def command_of(path: Path) -> tuple[str, ...]:
 
 
 @contextmanager
-def members(
-    path: Path, *names: str, stderr: int = subprocess.DEVNULL, **environment: str
-) -> Iterator[list[subprocess.Popen[str]]]:
+def members(path: Path, *names: str, **environment: str) -> Iterator[list[ForkedCommand]]:
     """Run processes of a system by hand, without a coordinator; end them as Ctrl-C does."""
-    processes = [
-        subprocess.Popen(
-            [*command_of(path), "--process", name],
-            stderr=stderr,
-            text=True,
-            env={**os.environ, **environment},
-        )
-        for name in names
-    ]
+    processes = [start_member(path, name, environment) for name in names]
     try:
         yield processes
     finally:
@@ -89,6 +84,16 @@ def members(
             process.send_signal(signal.SIGINT)
         for process in processes:
             process.wait(PATIENCE_S)
+
+
+def start_member(
+    path: Path, name: str, environment: Mapping[str, str] = MappingProxyType({})
+) -> ForkedCommand:
+    command = ("run", str(path), "--process", name)
+    with Path(os.devnull).open("w", encoding="utf-8") as nothing:
+        return ForkedCommand(
+            *command, stdout=nothing, stderr=nothing, env=environment, chooses_profile=False
+        )
 
 
 @contextmanager

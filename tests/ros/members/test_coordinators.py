@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -26,21 +25,20 @@ from composer.runtime.process.instance_lock import (
 )
 from composer.runtime.ros.service_requests import STATE_QOS
 from composer.runtime.supervision.events import NodeFailed
-from tests.ros.members.split_robot import DETECTOR, TEXT, command_of, members, split, states
+from tests.ros.members.split_robot import (
+    DETECTOR,
+    TEXT,
+    command_of,
+    members,
+    split,
+    start_member,
+    states,
+)
 from tests.ros.support.commands import code_of_end
+from tests.ros.support.forked import ForkedCommand
 from tests.ros.support.in_process import PATIENCE_S, Peer, RunningSystem, system_of, wait_until
 from tests.ros.support.system_process import RunningSystem as CommandProcess
 from tests.ros.support.system_process import write_system
-
-
-@contextmanager
-def started_by_hand(
-    folder: Path, text: str = TEXT, stderr: int = subprocess.DEVNULL
-) -> Iterator[tuple[Path, list[subprocess.Popen[str]]]]:
-    """Run both processes of the robot without a coordinator; return the file and the processes."""
-    path = write_system(folder, text, detector=DETECTOR)
-    with members(path, "sensing", "acting", stderr=stderr) as processes:
-        yield path, processes
 
 
 @pytest.mark.timeout(200)
@@ -52,7 +50,8 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     # With this backoff, the process returns before the coordinator starts one in its place.
     text = TEXT.replace("backoff_ms: 100", "backoff_ms: 10000")
     text = text.replace("  arm:\n", "  arm:\n    behavior: detector:Arm\n")
-    with started_by_hand(tmp_path, text) as (path, processes):
+    path = write_system(tmp_path, text, detector=DETECTOR)
+    with members(path, "sensing", "acting") as processes:
         wait_until(lambda: len(running_managers(peer)) == 2, "the processes", 2.0 * PATIENCE_S)
         moves = coordinate_and_pause(path, peer)
         with split(tmp_path, text) as system:  # another one, and the pause goes on
@@ -75,8 +74,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
             assert str(failed).endswith("process 'sensing' has ended; waiting for it")
             assert system.node("detector").state == "inactive"
             processes[0].wait()
-            command = [*command_of(path), "--process", "sensing"]
-            processes[0] = subprocess.Popen(command, text=True)
+            processes[0] = start_member(path, "sensing")
             wait_until(lambda: states(system) == {"active"}, "the return", 2.0 * PATIENCE_S)
 
             forget(moves, "active")
@@ -95,7 +93,7 @@ def test_processes_outlive_the_coordinator_if_it_did_not_start_them(
     assert [member.returncode for member in processes] == [0, 0]
 
 
-def stop_until_the_pause(member: subprocess.Popen[str], system: RunningSystem, peer: Peer) -> None:
+def stop_until_the_pause(member: ForkedCommand, system: RunningSystem, peer: Peer) -> None:
     """Stop the process of the detector; let it return before the pause is complete."""
     reports = peer.listen(String, "/lab/robot/acting/manager/state", STATE_QOS)
     wait_until(lambda: reports, "a report")
@@ -156,21 +154,29 @@ def forget(moves: list[TransitionEvent], goal: str) -> None:
 
 def test_only_one_of_two_starters_runs_a_process(tmp_path: Path) -> None:
     # The coordinator starts both as well, at the same time.
-    with (
-        started_by_hand(tmp_path, stderr=subprocess.PIPE) as (_, processes),
-        split(tmp_path) as system,
-    ):
-        assert states(system) == {"active"}
-        for member, node in zip(processes, ("camera", "detector"), strict=True):
-            if system.node(node).pid is not None:
-                assert "already runs in ROS domain" in member.communicate(timeout=60.0)[1]
-                assert member.returncode == 1
-        assert "already runs" not in system.log_text()
-        assert not system.reported(NodeFailed)
+    command = [*command_of(write_system(tmp_path, TEXT, detector=DETECTOR)), "--process"]
+    processes = [
+        subprocess.Popen([*command, name], stderr=subprocess.PIPE, text=True)
+        for name in ("sensing", "acting")
+    ]
+    try:
+        with split(tmp_path) as system:
+            assert states(system) == {"active"}
+            for member, node in zip(processes, ("camera", "detector"), strict=True):
+                if system.node(node).pid is not None:
+                    assert "already runs in ROS domain" in member.communicate(timeout=60.0)[1]
+                    assert member.returncode == 1
+            assert "already runs" not in system.log_text()
+            assert not system.reported(NodeFailed)
+    finally:
+        for member in processes:
+            member.send_signal(signal.SIGINT)
+            member.wait(PATIENCE_S)
 
 
 def test_the_last_counters_of_processes_that_stay(tmp_path: Path) -> None:
-    with started_by_hand(tmp_path) as (_, processes):
+    path = write_system(tmp_path, TEXT, detector=DETECTOR)
+    with members(path, "sensing", "acting") as processes:
         wait_until(lambda: len(local_systems()) == 2, "the processes")
         with split(tmp_path) as system:
             found = system.node("arm").statistics

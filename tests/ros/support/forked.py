@@ -140,7 +140,10 @@ class ForkedProcess:
 
 
 class ForkedCommand(ForkedProcess):
-    """A ``compose`` command in a process of its own."""
+    """A ``compose`` command in a process of its own.
+
+    Unless it ``chooses_profile``, it has the Fast DDS profile of the tests.
+    """
 
     def __init__(
         self,
@@ -150,9 +153,12 @@ class ForkedCommand(ForkedProcess):
         merged: bool = False,
         cwd: Path | None = None,
         env: Mapping[str, str] | None = None,
+        chooses_profile: bool = True,
     ) -> None:
-        environment = {**os.environ, **_DISCOVERY, **(env or {})}
-        environment.pop(_PROFILE, None)
+        discovery = _DISCOVERY if chooses_profile else {}
+        environment = {**os.environ, **discovery, **(env or {})}
+        if chooses_profile:
+            environment.pop(_PROFILE, None)
         super().__init__(
             _run_command,
             ("compose", *arguments),
