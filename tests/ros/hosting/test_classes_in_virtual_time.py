@@ -224,7 +224,10 @@ def test_what_a_class_cannot_do_is_reported(
 
 
 @pytest.mark.parametrize("is_ros", ["true", "false"])
-def test_a_class_that_waits_busily_ends_the_run(tmp_path: Path, is_ros: str) -> None:
+def test_a_class_that_waits_busily_ends_the_run(
+    tmp_path: Path, is_ros: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(virtual_time, "LOOK_S", 0.1)  # it is interrupted after two looks
     node = f'{{class: "{TIMED}:WaitsBusily", arguments: {{is_ros: {is_ros}}}}}'
     with open_system(tmp_path, f"system: s\nnodes: {{busily: {node}}}\n") as system:
         system.advance(10.0)
