@@ -9,11 +9,18 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import String
 
-from composer.runtime.supervision.events import NodeFailed, Restarted, StateChanged, Stuck
+from composer.model import PrimaryState
+from composer.runtime.host_options import HostOptions
+from composer.runtime.supervision.events import (
+    BroughtUp,
+    NodeFailed,
+    Restarted,
+    StateChanged,
+    Stuck,
+)
 from composer.runtime.supervision.health_monitor import CheckTime
-from tests.ros.support.faulty_system import write_faulty_system
-from tests.ros.support.in_process import Peer, RunningSystem, running, wait_until
-from tests.ros.support.system_process import RunningSystem as CommandProcess
+from tests.ros.support.faulty_system import HANGING, write_faulty_system
+from tests.ros.support.in_process import Peer, RunningSystem, running, system_of, wait_until
 
 ROBOT = """
 system: robot
@@ -330,17 +337,21 @@ def test_callbacks_that_wait_for_a_hanging_callback_are_not_interrupted(tmp_path
         assert system.states("/relay")[-1] == "/relay active"
 
 
-#: Threads switch so often that all interleavings happen.
-PROGRAM = "import sys; sys.setswitchinterval({interval_s}); from composer.cli import main; main()"
-
-
 def test_nodes_on_many_threads_come_up_with_frequent_thread_switches(tmp_path: Path) -> None:
-    path = write_faulty_system(tmp_path)
-    text = path.read_text(encoding="utf-8")
+    """Threads switch so often that all interleavings happen."""
+    text = write_faulty_system(tmp_path, HANGING).read_text(encoding="utf-8")
     patient = text.replace("_ms: 300", "_ms: 20000").replace("_ms: 2500", "_ms: 20000")
-    path.write_text(patient, encoding="utf-8")
-    program = (sys.executable, "-c", PROGRAM.format(interval_s=1e-5))
-    with CommandProcess(str(path), "--autostart", "active", program=program) as system:
+    usual_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    options = HostOptions(stop_within_s=60.0)
+    system = RunningSystem(system_of(patient, tmp_path), options, PrimaryState.ACTIVE)
+    try:
         # On a busy machine, each switch of threads may have to wait for a processor.
-        system.wait_for("17 of 17 nodes active after", timeout_s=150)
-        assert "ERROR" not in system.output
+        wait_until(lambda: system.reported(BroughtUp) or system.has_ended(), "bring-up", 150.0)
+        (up,) = system.reported(BroughtUp)
+        assert (up.active, up.remarks) == (1 + len(HANGING), ())
+    finally:
+        sys.setswitchinterval(usual_s)
+        outcome = system.stop()
+    assert outcome.exit_code == 0
+    assert not any(node.errors for node in outcome.nodes)
