@@ -112,7 +112,6 @@ NODES = 24
 #: The lease of a participant, after which others remove it.
 LEASE_S = 20.0
 ATTEMPTS = 3
-COUNT = f"{NODES} of {NODES} nodes active"
 
 
 #: Its nodes have a publisher, a subscription and a service each.
@@ -144,8 +143,8 @@ def test_a_large_system_leaves_the_graph_as_soon_as_it_ends(tmp_path: Path, peer
 def is_gone_at_once(path: Path, peer: Peer) -> bool:
     """Run and stop the system; return whether the peer noticed before the lease ended."""
     before = set(SHARED_MEMORY.iterdir())
-    with RunningSystem(str(path), program=COMPOSE) as run:
-        run.wait_for(COUNT)
+    with RunningSystem(str(path)) as run:
+        run.wait_for(f"{NODES} of {NODES} nodes active")
         client = peer.client(Trigger, "/node_7/answer")
         ours = shared_memory_of(run.process.pid) - before
         run.process.send_signal(signal.SIGINT)

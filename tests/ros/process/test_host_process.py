@@ -23,19 +23,19 @@ from tests.ros.support.in_process import end_limit_s
 from tests.ros.support.system_process import PATIENCE_S, RunningSystem, write_system
 
 PIPELINE = "systems/pipeline.yaml"
-
-
-def compose_run(system: str | Path, *options: str) -> RunningSystem:
-    """Run a system in a new interpreter."""
-    return RunningSystem(str(system), *options, program=COMPOSE)
+#: The order of the tear-down.
+ORDER = ("/control/motor_controller", "/planning/planner", "/perception/sensor_simulator")
 
 
 @pytest.mark.parametrize(
-    ("number", "times"), [(signal.SIGQUIT, 1), (signal.SIGHUP, 1), (signal.SIGINT, 2)]
+    ("number", "times", "program"),
+    [(signal.SIGQUIT, 1, ()), (signal.SIGHUP, 1, ()), (signal.SIGINT, 2, COMPOSE)],
 )
-def test_a_signal_ends_the_pipeline_in_order(number: signal.Signals, times: int) -> None:
+def test_a_signal_ends_the_pipeline_in_order(
+    number: signal.Signals, times: int, program: tuple[str, ...]
+) -> None:
     """The same one twice counts once, as forwarded by make, timeout or a launcher."""
-    with compose_run(PIPELINE) as run:
+    with RunningSystem(PIPELINE, program=program) as run:
         run.wait_for("3 of 3 nodes active")
         for _ in range(times - 1):
             run.process.send_signal(number)
@@ -49,12 +49,7 @@ def test_a_signal_ends_the_pipeline_in_order(number: signal.Signals, times: int)
     path = socket_path("/pipeline")
     assert path is not None
     assert not path.exists()
-    order = [
-        "/control/motor_controller finalized",
-        "/planning/planner finalized",
-        "/perception/sensor_simulator finalized",
-    ]
-    places = [text.index(line) for line in order]
+    places = [text.index(f"{node} finalized") for node in ORDER]
     assert places == sorted(places)
 
 
@@ -75,12 +70,12 @@ class Hanging(Behavior):
 """
 
 
-@pytest.mark.parametrize("repeat_signal", [False, True])
+@pytest.mark.parametrize(("program", "repeat_signal"), [((), False), (COMPOSE, True)])
 def test_a_process_with_a_hanging_callback_ends_in_time(
-    tmp_path: Path, *, repeat_signal: bool
+    tmp_path: Path, program: tuple[str, ...], *, repeat_signal: bool
 ) -> None:
     path = write_system(tmp_path, HANGING, hanging=HANGING_MODULE)
-    with compose_run(path) as run:
+    with RunningSystem(str(path), program=program) as run:
         run.wait_for(r"\[hanging\] hanging")
         run.process.send_signal(signal.SIGINT)
         run.wait_for("shutting down: SIGINT")
@@ -98,7 +93,7 @@ def test_a_process_with_a_hanging_callback_ends_in_time(
 
 def test_an_invalid_environment_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "-1")
-    with compose_run("systems/minimal.yaml", "--for", "1") as run:
+    with RunningSystem("systems/minimal.yaml", "--for", "1") as run:
         assert run.wait() == 1
     assert "ROS_DOMAIN_ID is '-1', which is not a domain id" in run.output
     assert "Traceback" not in run.output
@@ -123,7 +118,7 @@ def test_incomplete_shared_memory_of_a_killed_process_does_not_hang_a_system(
 ) -> None:
     left = tuple(incomplete_ports(ros_domain_id))
     try:
-        with compose_run(PIPELINE, "--for", "0.1") as run:
+        with RunningSystem(PIPELINE, "--for", "0.1") as run:
             assert run.wait() == 0
         # Whether one that remains hangs a participant depends on which ports it opens.
         assert not [port for port in left if port.exists()]
@@ -198,8 +193,6 @@ def test_what_a_process_loads_of_ros(
 
 #: The lines that start each part of the pipeline's life.
 MOMENTS = ("inactive$", "sensor_simulator active$", "3 of 3 nodes active")
-#: The order of the tear-down.
-ORDER = ("/control/motor_controller", "/planning/planner", "/perception/sensor_simulator")
 
 
 def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
@@ -207,7 +200,7 @@ def end_at(moment: str, delay_s: float, number: signal.Signals) -> float:
 
     Check that the end is in time and in order and leaves no processes; return how long it took.
     """
-    with RunningSystem("systems/pipeline.yaml", "--for", "30") as system:
+    with RunningSystem(PIPELINE, "--for", "30") as system:
         system.wait_for(moment)
         time.sleep(delay_s)
         _, *left = children(system.process.pid)
@@ -244,7 +237,6 @@ def check_order(lines: list[str], state: str, case: str) -> None:
 def test_a_signal_at_a_random_moment_ends_everything(number: signal.Signals, times: int) -> None:
     seed = random.randrange(2**32)
     chance = random.Random(seed)
-    took_s = [
-        end_at(moment, chance.uniform(0.0, 0.4), number) for _ in range(times) for moment in MOMENTS
-    ]
+    moments = chance.sample(MOMENTS, 2) if times == 1 else MOMENTS * times
+    took_s = [end_at(moment, chance.uniform(0.0, 0.4), number) for moment in moments]
     print(f"{number.name}: {len(took_s)} ends, seed {seed}, longest {max(took_s):.2f} s")
