@@ -29,7 +29,7 @@ from tests.ros.support.system_process import write_system
 SYSTEM = """
 system: robot
 discovery: {{kind: server, address: 127.0.0.1, port: {port}, start: true}}
-processes: {{sensing: {{nodes: [camera]}}, acting: {{nodes: [arm]}}}}
+{processes}
 nodes:
   camera:
     publishers: {{image: {{type: std_msgs/msg/String, qos: command}}}}
@@ -42,6 +42,7 @@ nodes:
   logger:
     subscriptions: {{move: {{type: std_msgs/msg/String, qos: command, log: "{{message.data}}"}}}}
 """
+PROCESSES = "processes: {sensing: {nodes: [camera]}, acting: {nodes: [arm]}}"
 NODES = ("arm", "camera", "logger")
 ALL = [*NODES, *["manager"] * 3]
 
@@ -53,9 +54,12 @@ def port() -> int:
         return int(free.getsockname()[1])
 
 
-def written(folder: Path, port: int, address: str = "127.0.0.1") -> Path:
+def written(
+    folder: Path, port: int, address: str = "127.0.0.1", processes: str = PROCESSES
+) -> Path:
     """Return the path of the system, which is written to ``folder``."""
-    return write_system(folder, SYSTEM.replace("127.0.0.1", address).format(port=port))
+    text = SYSTEM.replace("127.0.0.1", address)
+    return write_system(folder, text.format(port=port, processes=processes))
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +137,7 @@ def test_the_server_ends_with_the_system(system: Running, port: int) -> None:
 
 
 def test_a_system_uses_a_server_that_does_not_end_with_it(port: int, tmp_path: Path) -> None:
-    path = written(tmp_path, port)
+    path = written(tmp_path, port, processes="")
     assert compose("hosts", "discovery-server", path, "--ready").returncode == 1
     server = start("hosts", "discovery-server", str(path))
     try:

@@ -240,8 +240,9 @@ class Recorder(Behavior):
 """
 
 
-def write_chain(folder: Path) -> Path:
-    lines = ["system: chain", "processes: {a: {nodes: ['a*']}, b: {nodes: ['b*']}}", "nodes:"]
+def write_chain(folder: Path, *processes: str) -> Path:
+    entries = ", ".join(f"{name}: {{nodes: ['{name}*']}}" for name in processes)
+    lines = ["system: chain", f"processes: {{{entries}}}", "nodes:"]
     for index, name in enumerate(CHAIN):
         needs = f", lifecycle: {{depends_on: [{CHAIN[index - 1]}]}}" if index else ""
         lines.append(f"  {name}: {{behavior: 'recorder:Recorder'{needs}}}")
@@ -258,7 +259,7 @@ def test_a_chain_over_processes_goes_down_in_order(
 ) -> None:
     record = tmp_path / "record"
     monkeypatch.setenv("RECORD", str(record))
-    path = write_chain(tmp_path)
+    path = write_chain(tmp_path, "a", "b")
 
     def goes_down_in_time() -> bool:
         record.unlink(missing_ok=True)
@@ -281,7 +282,7 @@ def test_a_process_that_ends_by_itself_takes_its_nodes_down_in_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RECORD", str(tmp_path / "record"))
-    path = write_chain(tmp_path)
+    path = write_chain(tmp_path, "a")
     with members(path, "a") as (member,):
         wait_until(lambda: is_held("/chain/a"), "the process")
         with CommandProcess(str(path)) as system:
