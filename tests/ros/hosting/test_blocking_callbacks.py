@@ -44,25 +44,25 @@ def test_callbacks_sleep_at_a_rate_and_wait_for_their_own_subscription(
     assert counted.errors == 0
 
 
-@pytest.mark.parametrize("arguments", ["is_async: false", "is_async: true", "seconds: 600"])
-def test_a_goal_that_sleeps_does_not_keep_the_system_from_ending(
-    tmp_path: Path, peer: Peer, arguments: str
-) -> None:
-    text = f"""
-    system: sleeping
-    nodes: {{server: {{class: "{CLASSES}:SleepingServer", arguments: {{{arguments}}}}}}}
-    """
+def test_goals_that_sleep_do_not_keep_the_system_from_ending(tmp_path: Path, peer: Peer) -> None:
+    servers = {"plain": "is_async: false", "coroutine": "is_async: true", "long": "seconds: 600"}
+    text = "system: sleeping\nnodes:\n"
+    for name, arguments in servers.items():
+        keys = f"arguments: {{{arguments}}}, remappings: {{navigate: {name}}}"
+        text += f"  {name}: {{class: '{CLASSES}:SleepingServer', {keys}}}\n"
     with running(text, tmp_path, options=HostOptions(stop_within_s=2.0)) as system:
-        client = peer.action_client(Navigate, "/navigate")
-        peer.run(lambda: client.send_goal_async(Navigate.Goal()))
-        wait_until(lambda: system.node("server").instance.goals)
+        for name in servers:
+            client = peer.action_client(Navigate, f"/{name}")
+            peer.run(lambda client=client: client.send_goal_async(Navigate.Goal()))
+            wait_until(lambda name=name: system.node(name).instance.goals)
         began_s = time.monotonic()
         outcome = system.stop()
         assert time.monotonic() - began_s < end_limit_s() + 2.0
     assert outcome.exit_code == 0
-    assert [(node.state, node.errors) for node in outcome.nodes] == [("finalized", 0)]
-    assert "is interrupted; it is at" in system.log_text()
-    assert "callback_classes.py:" in system.log_text()
+    assert [(node.state, node.errors) for node in outcome.nodes] == [("finalized", 0)] * 3
+    interrupted = [line for line in system.log() if "is interrupted; it is at" in line]
+    assert len(interrupted) == len(servers)
+    assert all("callback_classes.py:" in line for line in interrupted)
 
 
 def test_a_callback_that_waits_too_long_is_interrupted(tmp_path: Path) -> None:

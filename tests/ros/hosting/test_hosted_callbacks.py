@@ -86,19 +86,18 @@ def test_coroutines_await_clients_and_keep_their_callback_groups(
         wait_until(lambda: system.node("groups").instance.together == 1)
 
 
-@pytest.mark.parametrize("name", ["Spinner", "Poller"])
-def test_a_thread_of_the_class_that_follows_rclpy_ends_with_the_instance(
-    tmp_path: Path, name: str
-) -> None:
-    text = f'system: spins\nnodes: {{spinner: {{class: "{OTHERS}:{name}"}}}}'
-    with running(text, tmp_path) as system:
-        spinner = system.node("spinner").instance
-        wait_until(lambda: system.node("spinner").statistics.sent >= 3)
-        assert spinner.thread.is_alive()
-        system.change("spinner", "deactivate", "cleanup")
-        wait_until(lambda: not spinner.thread.is_alive())
-        counted = system.summary("/spinner")
-    assert counted.errors == 0
+def test_a_thread_of_a_class_that_follows_rclpy_ends_with_the_instance(tmp_path: Path) -> None:
+    names = ("Spinner", "Poller")
+    nodes = ", ".join(f'{name}: {{class: "{OTHERS}:{name}"}}' for name in names)
+    with running(f"system: threads\nnodes: {{{nodes}}}", tmp_path) as system:
+        for name in names:
+            thread = system.node(name).instance.thread
+            sent = system.node(name).statistics
+            wait_until(lambda sent=sent: sent.sent >= 3)
+            assert thread.is_alive()
+            system.change(name, "deactivate", "cleanup")
+            wait_until(lambda thread=thread: not thread.is_alive())
+        assert [node.errors for node in system.stop().nodes] == [0, 0]
 
 
 @pytest.mark.parametrize("kind", ["events", "multi_threaded"])

@@ -103,7 +103,10 @@ nodes:
     executor: shared
     behavior: handled:Handled
     action_servers:
-      navigate: {type: composer_interfaces/action/Navigate, external: true, reentrant: REENTRANT}
+      navigate: {type: composer_interfaces/action/Navigate, external: true}
+"""
+REENTRANT = """
+      overlap: {type: composer_interfaces/action/Navigate, external: true, reentrant: true}
 """
 PATIENT = """
 from composer.behavior import Behavior
@@ -119,20 +122,27 @@ class Handled(Behavior):
             await self.clock.sleep(0.002)
         self.log.info(f"end {goal.request.target.x}")
         return Navigate.Result(message="stopped")
+
+    on_overlap = on_navigate
 """
 
 
-def handled(kind: str = "events", reentrant: bool = False) -> str:
-    return HANDLED.replace("KIND", kind).replace("REENTRANT", str(reentrant).lower())
+def handled(kind: str = "events") -> str:
+    return HANDLED.replace("KIND", kind)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_goals_run_one_at_a_time_and_end_when_canceled_or_deactivated(
+def test_goals_run_one_at_a_time_unless_reentrant_and_end_when_canceled_or_deactivated(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     canceled = GoalStatus.STATUS_CANCELED
-    with running(handled(kind), tmp_path, handled=PATIENT) as system:
-        navigator = Navigator(peer)
+    text = handled(kind) + REENTRANT.lstrip("\n")
+    with running(text, tmp_path, handled=PATIENT) as system:
+        navigator, overlapping = Navigator(peer), Navigator(peer, "/overlap")
+        for number in (11.0, 12.0):
+            assert overlapping.send(number).accepted
+        for number in (11.0, 12.0):
+            system.wait_for_log(f"begin {number}")
         assert not navigator.send(100.0).accepted
         first, second, third = (navigator.send(float(number)) for number in (1, 2, 3))
         system.wait_for_log("begin 1.0")
@@ -181,15 +191,6 @@ def test_few_ended_goals_are_kept(
     assert max(len(item.status_list) for item in statuses) <= 5
     assert [result.message for _, result in outcomes[-3:]] == ["7.0", "8.0", "9.0"]
     assert {status for status, _ in outcomes[:4]} == {GoalStatus.STATUS_UNKNOWN}
-
-
-def test_goals_of_a_reentrant_port_overlap(tmp_path: Path, peer: Peer) -> None:
-    with running(handled(reentrant=True), tmp_path, handled=PATIENT) as system:
-        navigator = Navigator(peer)
-        assert navigator.send(1.0).accepted
-        assert navigator.send(2.0).accepted
-        system.wait_for_log("begin 1.0")
-        system.wait_for_log("begin 2.0")
 
 
 def test_a_handler_that_does_not_end_its_goal_is_canceled(tmp_path: Path, peer: Peer) -> None:
