@@ -96,6 +96,7 @@ nodes:
       set: {type: std_srvs/srv/SetBool, external: true, respond: {message: "prefilled"}}
       plain: {type: std_srvs/srv/Trigger, external: true}
       deferred: {type: std_srvs/srv/Trigger, external: true}
+      endless: {type: std_srvs/srv/Trigger, external: true}
 """
 MODULE = """
 from composer.behavior import Behavior
@@ -106,43 +107,38 @@ class Handled(Behavior):
         return response
 
     def on_plain(self, request, response):
-        OUTCOME
+        response.message = "fine"
+        return response
 
     async def on_deferred(self, request, response):
         await self.clock.sleep(0.001)
-        OUTCOME
+        return self.on_plain(request, response)
+
+    async def on_endless(self, request, response):
+        self.log.info("begun")
+        await self.clock.sleep(60.0)
 """
 KINDS = ["events", "multi_threaded"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_handler_gets_the_declared_response_and_returns_its_own(
+def test_handlers_respond_and_pending_requests_are_refused_when_the_node_leaves_active(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
-    module = MODULE.replace("OUTCOME", 'response.message = "fine"; return response')
-    with running(HANDLED.replace("KIND", kind), tmp_path, handled=module):
+    with running(HANDLED.replace("KIND", kind), tmp_path, handled=MODULE) as system:
         answer = peer.call(SetBool, "/set", SetBool.Request(data=True))
         plain, deferred = (peer.call(Trigger, name) for name in ("/plain", "/deferred"))
-    assert (answer.success, answer.message) == (True, "prefilled")
-    assert (plain.message, deferred.message) == ("fine", "fine")
-
-
-def test_pending_requests_are_refused_when_the_node_leaves_active(
-    tmp_path: Path, peer: Peer
-) -> None:
-    module = MODULE.replace("OUTCOME", "await_forever = None").replace(
-        "await self.clock.sleep(0.001)", "self.log.info('begun'); await self.clock.sleep(60.0)"
-    )
-    with running(HANDLED.replace("KIND", "events"), tmp_path, handled=module) as system:
-        client = peer.client(Trigger, "/deferred")
+        client = peer.client(Trigger, "/endless")
         first = client.call_async(Trigger.Request())
         system.wait_for_log("begun")
         waiting = client.call_async(Trigger.Request())
         assert peer.change("/handled", "deactivate")
-        answers = [finished(first), finished(waiting)]
-    assert [answer.success for answer in answers] == [False, False]
-    assert "/handled is deactivating, not active" in answers[0].message
-    assert "not active" in answers[1].message  # it may arrive a moment later
+        refusals = [finished(first), finished(waiting)]
+    assert (answer.success, answer.message) == (True, "prefilled")  # the declared response
+    assert (plain.message, deferred.message) == ("fine", "fine")
+    assert [refusal.success for refusal in refusals] == [False, False]
+    assert "/handled is deactivating, not active" in refusals[0].message
+    assert "not active" in refusals[1].message  # it may arrive a moment later
     assert system.end().exit_code == 0
     assert system.end().nodes[0].errors == 0
 
@@ -229,6 +225,21 @@ CALLER_MODULE = """
 from composer.behavior import Behavior, CallCancelled, ServerUnavailable
 
 class Caller(Behavior):
+    async def on_configure(self):
+        client = self.clients.trigger
+        try:
+            client.call("nonsense")
+        except TypeError as error:
+            self.log.info(str(error))
+        try:
+            await client.call(client.service_type.Request())
+        except CallCancelled as error:
+            self.log.info(str(error))
+        try:
+            self.clients.triger
+        except AttributeError as error:
+            self.log.info(str(error))
+
     async def on_ask(self):
         self.log.info("asking")
         try:
@@ -252,7 +263,7 @@ class Caller(Behavior):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_calls_and_sleeps_end_when_the_node_leaves_active(
+def test_errors_are_raised_at_once_and_calls_end_when_the_node_leaves_active(
     tmp_path: Path, peer: Peer, kind: str
 ) -> None:
     with running(CALLER.replace("KIND", kind), tmp_path, caller=CALLER_MODULE) as system:
@@ -263,36 +274,13 @@ def test_calls_and_sleeps_end_when_the_node_leaves_active(
         assert peer.state("/caller") == "inactive"
         wait_until(lambda: not context.tasks, "no task is running")
         counted = system.summary("/caller")
+    assert system.log()[:3] == [
+        "client 'trigger' takes a Trigger.Request, not str",
+        "/caller is configuring, not active",
+        "no client 'triger'; available: trigger",
+    ]
     assert "cancelled: /caller is deactivating, not active" in system.log()
     assert "last try: no server of service '/trigger' was available within 20 ms" in system.log(), (
         "a node may make calls while it deactivates"
     )
     assert counted.errors == 0
-
-
-def test_errors_in_a_call_are_raised_at_once(tmp_path: Path) -> None:
-    module = """
-    from composer.behavior import Behavior, CallCancelled
-
-    class Caller(Behavior):
-        async def on_configure(self):
-            try:
-                self.clients.trigger.call("nonsense")
-            except TypeError as error:
-                self.log.info(str(error))
-            try:
-                await self.clients.trigger.call(self.clients.trigger.service_type.Request())
-            except CallCancelled as error:
-                self.log.info(str(error))
-            try:
-                self.clients.triger
-            except AttributeError as error:
-                self.log.info(str(error))
-    """
-    with running(CALLER.replace("KIND", "events"), tmp_path, caller=module) as system:
-        pass
-    assert system.log() == [
-        "client 'trigger' takes a Trigger.Request, not str",
-        "/caller is configuring, not active",
-        "no client 'triger'; available: trigger",
-    ]

@@ -118,19 +118,21 @@ FAILING = """
 system: robot
 lifecycle: {on_failure: restart, restart: {backoff_ms: 20}}
 nodes:
-  driver:
+  in_${where}:
+    for_each: {where: [configure, activate, tick]}
     behavior: driver:Driver
-    parameters: {fails_in: {type: string, default: WHERE}}
+    parameters: {fails_in: "${where}"}
     timers: {tick: {period_ms: 20}}
 """
 FAILING_DRIVER = """
+from collections import Counter
 from composer.behavior import Behavior
 
-LIVES = []
+LIVES = Counter()
 
 class Driver(Behavior):
     def on_configure(self):
-        LIVES.append(self)
+        LIVES[self.name] += 1
         self.check("configure")
 
     def on_activate(self):
@@ -140,27 +142,26 @@ class Driver(Behavior):
         self.check("tick")
 
     def check(self, where):
-        if len(LIVES) == 1 and self.parameters.fails_in == where:
+        if LIVES[self.name] == 1 and self.parameters.fails_in == where:
             self.fail("lost the device")
 """
 
 
-@pytest.mark.parametrize(
-    ("where", "reason"),
-    [
-        ("configure", "configure failed: Failed: lost the device"),
-        ("activate", "activate failed: Failed: lost the device"),
-        ("tick", "lost the device"),
-    ],
-)
-def test_a_behavior_can_fail_its_node(tmp_path: Path, where: str, reason: str) -> None:
-    text = FAILING.replace("WHERE", where)
-    with running(text, tmp_path, driver=FAILING_DRIVER) as system:
-        wait_until(lambda: system.reported(Restarted), "the restart")
-        (failed,) = system.reported(NodeFailed)
-        assert (failed.reason, failed.consequence) == (reason, "restart 1 in 0.02 s")
-        assert system.node("driver").state == "active"
-        assert system.stop().exit_code == 0
+def test_behaviors_can_fail_their_nodes(tmp_path: Path) -> None:
+    reasons = {
+        "/in_configure": "configure failed: Failed: lost the device",
+        "/in_activate": "activate failed: Failed: lost the device",
+        "/in_tick": "lost the device",
+    }
+    with running(FAILING, tmp_path, driver=FAILING_DRIVER) as system:
+        wait_until(lambda: len(system.reported(Restarted)) == len(reasons), "the restarts")
+        failures = system.reported(NodeFailed)
+        assert {event.nodes[0]: event.reason for event in failures} == reasons
+        assert [event.consequence for event in failures] == ["restart 1 in 0.02 s"] * len(reasons)
+        outcome = system.stop()
+    assert outcome.exit_code == 0
+    for name in reasons:
+        assert f"{name} active" in system.states(name)[-4:]
 
 
 CLASS = """
