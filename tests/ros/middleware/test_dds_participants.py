@@ -24,6 +24,7 @@ from composer.runtime.middleware.local_resources import (
 )
 from composer.runtime.ros.graph import UNKNOWN_NODE, RosGraph, participant
 from tests.ros.support.commands import PYTHON, compose, hand_written, running
+from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.raw_rmw import NodeNames, own_prefix
 from tests.ros.support.system_process import write_system
@@ -184,17 +185,18 @@ def number(process: int) -> bytes:
 
 
 def test_a_command_discovers_others_without_shared_memory_and_is_forgotten_soon(
-    peer: Peer,
+    tmp_path: Path, peer: Peer
 ) -> None:
     def participants() -> int:
         return len(peer.node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True))
 
     before = participants()
     multicast = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
-    command = [*PYTHON, "-c", PRINT_TRANSPORTS]
+    program = tmp_path / "print_transports.py"
+    program.write_text(PRINT_TRANSPORTS, encoding="utf-8")
     for _ in range(3):  # most of their goodbye messages are lost
-        done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=50.0)
-        others, ports, shared = json.loads(done.stdout.splitlines()[-1])
+        printed, _ = ForkedProgram(program, chooses_profile=True).communicate(timeout=50.0)
+        others, ports, shared = json.loads(printed.splitlines()[-1])
         assert [peer.node.get_name(), peer.node.get_namespace()] in others
         assert shared == []
         assert ports

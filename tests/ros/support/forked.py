@@ -155,10 +155,7 @@ class ForkedCommand(ForkedProcess):
         env: Mapping[str, str] | None = None,
         chooses_profile: bool = True,
     ) -> None:
-        discovery = _DISCOVERY if chooses_profile else {}
-        environment = {**os.environ, **discovery, **(env or {})}
-        if chooses_profile:
-            environment.pop(_PROFILE, None)
+        environment = _environment(chooses_profile) | dict(env or {})
         super().__init__(
             _run_command,
             ("compose", *arguments),
@@ -173,21 +170,28 @@ class ForkedCommand(ForkedProcess):
 class ForkedProgram(ForkedProcess):
     """A Python program in a process of its own, with pipes as stdin and stdout.
 
-    It finds rclpy and the message packages imported.
+    It finds rclpy and the message packages imported. If it ``chooses_profile``, it has no Fast DDS
+    profile, as commands.
     """
 
     stdin: TextIO
     stdout: TextIO
 
-    def __init__(self, program: Path, *arguments: str) -> None:
+    def __init__(self, program: Path, *arguments: str, chooses_profile: bool = False) -> None:
         with os.fdopen(os.dup(2), "w") as stderr:  # where pytest captures it
             super().__init__(
                 _run_program,
                 (str(program), *arguments),
-                dict(os.environ),
+                _environment(chooses_profile),
                 stderr=stderr,
                 reads=True,
             )
+
+
+def _environment(chooses_profile: bool) -> dict[str, str]:
+    if not chooses_profile:
+        return dict(os.environ)
+    return {name: value for name, value in os.environ.items() if name != _PROFILE} | _DISCOVERY
 
 
 def _pipe() -> tuple[TextIO, Connection]:
