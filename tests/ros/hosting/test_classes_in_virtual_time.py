@@ -121,19 +121,14 @@ def test_the_same_run_whatever_the_hash_seed(tmp_path: Path) -> None:
     assert output.count(b"\n/counted") > 100
 
 
-def test_clocks_and_sleeps_of_all_kinds(tmp_path: Path) -> None:
-    text = f'system: times\nnodes: {{reader: {{class: "{TIMED}:ClockReader"}}}}\n'
-    with open_system(tmp_path, text) as system:
+def test_clocks_sleeps_deadlines_and_serialized_messages(tmp_path: Path) -> None:
+    nodes = f'{{reader: {{class: "{TIMED}:ClockReader"}}, overdue: {{class: "{TIMED}:Overdue"}}}}'
+    with open_system(tmp_path, f"system: times\nnodes: {nodes}\n") as system:
         system.advance(3.9)
         times = instances(system)["reader"].times
-    assert times == [dict.fromkeys(times[0], pytest.approx(0.75))] * 3
-    assert [line.time_s for line in system.log] == [1.75, 3.75]
-
-
-def test_deadlines_and_serialized_messages(tmp_path: Path) -> None:
-    text = f'system: overdue\nnodes: {{overdue: {{class: "{TIMED}:Overdue"}}}}\n'
-    with open_system(tmp_path, text) as system:
-        system.advance(4.5)
+        assert times == [dict.fromkeys(times[0], pytest.approx(0.75))] * 3
+        assert [line.time_s for line in system.log] == [1.75, 3.75]
+        system.advance(0.6)
         overdue = instances(system)["overdue"]
         assert overdue.missed == {"offered": 3, "requested": 3}
         assert overdue.raw == [3]
@@ -225,32 +220,30 @@ def test_what_a_class_cannot_do_is_reported(
         assert at_s == pytest.approx(expected_s)
 
 
-@pytest.mark.parametrize("is_ros", ["true", "false"])
-def test_a_class_that_waits_busily_ends_the_run(
-    tmp_path: Path, is_ros: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(virtual_time, "LOOK_S", 0.1)  # it is interrupted after two looks
-    node = f'{{class: "{TIMED}:WaitsBusily", arguments: {{is_ros: {is_ros}}}}}'
-    with open_system(tmp_path, f"system: s\nnodes: {{busily: {node}}}\n") as system:
-        system.advance(10.0)
-    assert system.outcome is not None
-    assert system.outcome.exit_code == 1
-    reason = f"a callback goes on without waiting at {TIMED_FILE}:"
-    assert f"the time does not advance, because {reason}" in system.outcome.reason
+BUSY = "a callback goes on without waiting"
 
 
-@pytest.mark.parametrize("in_callback", ["true", "false"])
-def test_a_class_that_waits_for_a_lock_ends_the_run(
-    tmp_path: Path, in_callback: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("node", "arguments", "reason"),
+    [
+        ("WaitsBusily", "is_ros: true", BUSY),
+        ("WaitsBusily", "is_ros: false", BUSY),
+        ("Locked", "in_callback: true", "lock_again waits"),
+        ("Locked", "in_callback: false", "__init__ waits"),
+    ],
+)
+def test_a_class_that_waits_busily_or_for_a_lock_ends_the_run(
+    tmp_path: Path, node: str, arguments: str, reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(virtual_time, "LOOK_S", 0.01)
-    node = f'{{class: "{TIMED}:Locked", arguments: {{in_callback: {in_callback}}}}}'
-    system = open_system(tmp_path, f"system: s\nnodes: {{locked: {node}}}\n")
+    # A busy callback is interrupted after two looks, a waiting one ends the run after sixty.
+    monkeypatch.setattr(virtual_time, "LOOK_S", 0.1 if reason == BUSY else 0.01)
+    entry = f'{{class: "{TIMED}:{node}", arguments: {{{arguments}}}}}'
+    system = open_system(tmp_path, f"system: s\nnodes: {{waiting: {entry}}}\n")
     with suppress(TestFailure), system:
         system.advance(10.0)
     assert system.outcome is not None
     assert system.outcome.exit_code == 1
-    name = "lock_again" if in_callback == "true" else "__init__"
-    reason = f"the time does not advance, because {name} waits at {TIMED_FILE}:"
-    assert reason in system.outcome.reason
-    assert any(f"{name} has not returned for" in line.text for line in system.log)
+    assert f"the time does not advance, because {reason} at {TIMED_FILE}:" in system.outcome.reason
+    if reason != BUSY:
+        name = reason.removesuffix(" waits")
+        assert any(f"{name} has not returned for" in line.text for line in system.log)

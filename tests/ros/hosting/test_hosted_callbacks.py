@@ -18,28 +18,21 @@ CLASSES = "tests.ros.support.callback_classes"
 OTHERS = "tests.ros.support.node_classes"
 
 
-@pytest.mark.parametrize("executor", [None, "multi_threaded"])
-def test_a_callback_may_block_until_another_node_responds(
-    tmp_path: Path, executor: str | None
-) -> None:
-    kind = "" if executor is None else f"executors: {{own: {{kind: {executor}}}}}"
-    chosen = "" if executor is None else "executor: own"
+def test_a_callback_may_block_until_another_node_responds(tmp_path: Path) -> None:
     text = f"""
     system: blocking
-    {kind}
+    executors: {{own: {{kind: multi_threaded}}}}
     nodes:
       listener: {{class: "{OTHERS}:Listener"}}
-      caller:
-        class: {CLASSES}:BlockingCaller
-        {chosen}
+      caller: {{class: "{CLASSES}:BlockingCaller"}}
+      other: {{class: "{CLASSES}:BlockingCaller", executor: own}}
     """
     with running(text, tmp_path) as system:
-        caller = system.node("caller").instance
-        wait_until(lambda: len(caller.responses) >= 6)
-        assert all(response.success for response in caller.responses)
-        assert caller.overlaps == 0
-        counted = system.summary("/caller")
-    assert counted.errors == 0
+        callers = [system.node(name).instance for name in ("caller", "other")]
+        wait_until(lambda: all(len(caller.responses) >= 6 for caller in callers))
+        assert all(response.success for caller in callers for response in caller.responses)
+        assert [caller.overlaps for caller in callers] == [0, 0]
+        assert not any(node.errors for node in system.stop().nodes)
 
 
 def test_a_callback_that_waits_for_a_response_is_released_when_its_node_is_deactivated(

@@ -95,7 +95,9 @@ def test_a_message_object_that_is_published_again_arrives_as_it_was_unless_it_is
         assert listener.numbers == ([3, 3, 3] if isolation else [1, 2, 3])
 
 
-def test_several_instances_have_their_own_names_and_parameters(tmp_path: Path, peer: Peer) -> None:
+def test_instances_have_their_own_names_parameters_and_connections(
+    tmp_path: Path, peer: Peer
+) -> None:
     text = f"""
     system: many
     nodes:
@@ -108,6 +110,11 @@ def test_several_instances_have_their_own_names_and_parameters(tmp_path: Path, p
       rear:
         class: {CLASSES}:Talker
         arguments: {{prefix: rear}}
+        publishers: {{numbers: {{type: std_msgs/msg/Int64}}}}
+      listener:
+        class: {CLASSES}:Listener
+        subscriptions: {{numbers: {{type: std_msgs/msg/Int64}}}}
+    connections: [{{topic: /renamed, from: rear.numbers, to: [listener.numbers]}}]
     """
     with running(text, tmp_path) as system:
         spoken = peer.listen(String, "/robot/spoken")
@@ -119,14 +126,7 @@ def test_several_instances_have_their_own_names_and_parameters(tmp_path: Path, p
         front = system.node("front").instance
         assert front.get_fully_qualified_name() == "/robot/front"
         assert front.resolve_topic_name("numbers") == "/all/numbers"
-
-
-def test_connections_name_the_topics_of_a_class(tmp_path: Path) -> None:
-    text = TALKER_AND_LISTENER + (
-        "connections:\n  - {topic: /renamed, from: talker.numbers, to: [listener.numbers]}\n"
-    )
-    with running(text, tmp_path) as system:
-        assert system.node("talker").instance.publisher.topic_name == "/renamed"
+        assert system.node("rear").instance.publisher.topic_name == "/renamed"
         wait_until(lambda: system.node("listener").instance.numbers)
 
 

@@ -217,17 +217,26 @@ def test_every_outcome_of_a_handler_leads_to_a_primary_state(
             assert f"on_{transition} refused the transition: not now" in log
 
 
-def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) -> None:
+def test_requests_during_a_transition_are_refused_and_endless_ones_fail(
+    tmp_path: Path, peer: Peer
+) -> None:
     module = """
     from composer.behavior import Behavior
+    from composer.runtime.executors.futures import Future
 
     class Subject(Behavior):
         async def on_configure(self):
             self.log.info("begin")
             while not self.parameters.may_end:
                 await self.clock.sleep(0.01)
+
+    class Endless(Behavior):
+        async def on_configure(self):
+            await Future()
     """
     text = SUBJECT.replace("    behav", "    parameters: {may_end: false}\n    behav")
+    limits = "{autostart: unconfigured, timeout_ms: 200}"
+    text += f"  endless: {{behavior: subject:Endless, lifecycle: {limits}}}\n"
     with running(text, tmp_path, subject=module) as system:
         client = peer.client(ChangeState, "/subject/change_state")
         request = ChangeState.Request(transition=Transition(label="configure"))
@@ -239,10 +248,11 @@ def test_requests_during_a_transition_are_refused(tmp_path: Path, peer: Peer) ->
         assert peer.set_parameter("/subject", "may_end", True) == ""
         assert finished(pending).success
         assert peer.state("/subject") == "inactive"
-    assert (
-        "refused 'configure': the node is configuring; available transitions: none"
-        in system.log_text()
-    )
+        assert not peer.change("/endless", "configure")
+        assert peer.state("/endless") == "unconfigured"
+    log = system.log_text()
+    assert "refused 'configure': the node is configuring; available transitions: none" in log
+    assert "on_configure: TransitionTimeout: timed out after 0.2 s" in log
 
 
 def test_repeated_requests_that_are_refused_do_not_fill_the_log(tmp_path: Path, peer: Peer) -> None:
@@ -260,19 +270,3 @@ def test_repeated_requests_that_are_refused_do_not_fill_the_log(tmp_path: Path, 
         assert max(map(len, refused)) < 500
         assert all(map(str.isprintable, refused))
         assert refused[0].startswith(r"refused '\x1b[2J0xxx")
-
-
-def test_a_handler_that_never_ends_is_an_error(tmp_path: Path, peer: Peer) -> None:
-    module = """
-    from composer.behavior import Behavior
-    from composer.runtime.executors.futures import Future
-
-    class Subject(Behavior):
-        async def on_configure(self):
-            await Future()
-    """
-    text = SUBJECT.replace("unconfigured}", "unconfigured, timeout_ms: 200}")
-    with running(text, tmp_path, subject=module) as system:
-        assert not peer.change("/subject", "configure")
-        assert peer.state("/subject") == "unconfigured"
-    assert "on_configure: TransitionTimeout: timed out after 0.2 s" in system.log_text()
