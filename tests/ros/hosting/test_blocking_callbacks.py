@@ -12,7 +12,6 @@ from std_srvs.srv import Trigger
 
 from composer.runtime.host_options import HostOptions
 from composer.runtime.supervision import health_monitor
-from composer.runtime.supervision.events import NodeFailed
 from tests.ros.support.in_process import Peer, end_limit_s, finished, running, wait_until
 
 CLASSES = "tests.ros.support.callback_classes"
@@ -63,20 +62,6 @@ def test_goals_that_sleep_do_not_keep_the_system_from_ending(tmp_path: Path, pee
     interrupted = [line for line in system.log() if "is interrupted; it is at" in line]
     assert len(interrupted) == len(servers)
     assert all("callback_classes.py:" in line for line in interrupted)
-
-
-def test_a_callback_that_waits_too_long_is_interrupted(tmp_path: Path) -> None:
-    text = f"""
-    system: waiting
-    nodes:
-      caller:
-        class: "{CLASSES}:CallerWithoutServer"
-        lifecycle: {{on_failure: isolate, watch: {{callback_ms: 300}}}}
-    """
-    with running(text, tmp_path) as system:
-        wait_until(lambda: system.reported(NodeFailed), "the failure")
-        assert system.reported(NodeFailed)[0].reason == "on_timer took longer than 300 ms"
-        wait_until(lambda: "/caller unconfigured" in system.states(), "the isolation")
 
 
 def test_tasks_of_an_executor_block_as_callbacks_do(
