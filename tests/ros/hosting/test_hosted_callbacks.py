@@ -135,7 +135,10 @@ def test_goals_are_executed_while_the_node_is_active_and_canceled_when_it_is_not
         executor: own
         action_servers: {{navigate: {{type: composer_interfaces/action/Navigate, action: go}}}}
         remappings: {{navigate: go}}
-      sender: {{class: "{OTHERS}:Sender", remappings: {{navigate: go}}}}
+      sender:
+        class: {OTHERS}:Sender
+        remappings: {{navigate: go}}
+        lifecycle: {{depends_on: [navigator]}}
     """
     with running(text, tmp_path) as system:
         sender = system.node("sender").instance
