@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import signal
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 from composer.runtime.supervision.events import BroughtUp, Stuck
+from tests.ros.supervision.test_external_transitions import LifecycleManager
 from tests.ros.support import commands, in_process
 from tests.ros.support.in_process import Peer, finished, wait_until
 from tests.ros.support.system_process import RunningSystem, write_system
@@ -60,36 +58,15 @@ def running(folder: Path) -> Iterator[RunningSystem]:
 CLIENTS, REQUESTS = 5, 80
 
 
-class Client:
-    """A node that requests one transition after the other."""
-
-    def __init__(self, peer: Peer, requests: tuple[str | int, ...], first: int) -> None:
-        self.answers: list[bool] = []
-        self._requests = itertools.islice(itertools.cycle(requests), first, first + REQUESTS)
-        node = peer.join(f"client_{first}")
-        # With Fast DDS, each client receives all responses, and keeps ten by default.
-        self._client = node.create_client(
-            ChangeState, "/subject/change_state", qos_profile=QoSProfile(depth=1000)
-        )
-        wait_until(self._client.service_is_ready)
-
-    def send(self) -> None:
-        for wanted in self._requests:
-            key = "label" if isinstance(wanted, str) else "id"
-            request = ChangeState.Request(transition=Transition(**{key: wanted}))
-            self._client.call_async(request).add_done_callback(self._on_response)
-            return
-
-    def _on_response(self, future: Any) -> None:
-        self.answers.append(bool(future.result().success))
-        self.send()
-
-
 def test_all_requests_get_a_response(tmp_path: Path, peer: Peer) -> None:
     """From several nodes at once, with wrong ids and in wrong states."""
     with running(tmp_path) as system:
-        requests = (*CYCLE, "nonsense", 99, 0, Transition.TRANSITION_DESTROY)
-        clients = [Client(peer, requests, first) for first in range(CLIENTS)]
+        wanted = (*CYCLE, "nonsense", 99, 0, Transition.TRANSITION_DESTROY)
+        requests = [("/subject", transition) for transition in wanted] * REQUESTS
+        clients = [
+            LifecycleManager(peer, ["/subject"], requests[first : first + REQUESTS])
+            for first in range(CLIENTS)
+        ]
         peer.wait_until_known("/subject")
         for client in clients:
             client.send()

@@ -6,7 +6,7 @@ import itertools
 import subprocess
 import sys
 import threading
-from collections.abc import Coroutine, Iterator, Sequence
+from collections.abc import Coroutine, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -27,20 +27,21 @@ SENSOR = "/perception/sensor_simulator"
 PLANNER = "/planning/planner"
 MOTOR = "/control/motor_controller"
 TRANSITIONS = 20_000
+NUMBERS = itertools.count()
 UP, DOWN = ("configure", "activate"), ("deactivate", "cleanup")
 
 
 class LifecycleManager:
     """A client that moves some nodes, each request right after the response to the last one."""
 
-    def __init__(self, peer: Peer, nodes: tuple[str, ...], count: int) -> None:
+    def __init__(
+        self, peer: Peer, nodes: Sequence[str], requests: Iterable[tuple[str, str | int]]
+    ) -> None:
+        self.answers: list[bool] = []
         self.failed: list[str] = []
-        self.done = 0
-        self._count = count
-        down = [(node, transition) for transition in DOWN for node in reversed(nodes)]
-        up = [(node, transition) for transition in UP for node in nodes]
-        self._requests = itertools.cycle([*down, *up])
-        ros_node = peer.join(f"manager_of_{nodes[-1].replace('/', '_')}")
+        self._requests = iter(requests)
+        ros_node = peer.join(f"manager_{next(NUMBERS)}")
+        # With Fast DDS, each client receives all responses, and keeps ten by default.
         self._clients = {
             node: ros_node.create_client(
                 ChangeState, f"{node}/change_state", qos_profile=QoSProfile(depth=1000)
@@ -52,21 +53,28 @@ class LifecycleManager:
         peer.wait_until_known(nodes[0])
 
     def send(self) -> None:
-        node, label = next(self._requests)
-        request = ChangeState.Request(transition=Transition(label=label))
-        future = self._clients[node].call_async(request)
-        future.add_done_callback(lambda answer: self._on_response(f"{node} {label}", answer))
+        for node, wanted in self._requests:
+            key = "label" if isinstance(wanted, str) else "id"
+            request = ChangeState.Request(transition=Transition(**{key: wanted}))
+            future = self._clients[node].call_async(request)
+            future.add_done_callback(partial(self._on_response, f"{node} {wanted}"))
+            return
 
     def _on_response(self, requested: str, future: Any) -> None:
-        self.done += 1
-        if not future.result().success:
-            self.failed.append(f"{requested}, request {self.done}")
-        if self.done < self._count:
-            self.send()
+        self.answers.append(bool(future.result().success))
+        if not self.answers[-1]:
+            self.failed.append(f"{requested}, request {len(self.answers)}")
+        self.send()
 
 
-def has_progress(managers: Sequence[LifecycleManager], done: int) -> bool:
-    return sum(manager.done for manager in managers) > done
+def count_answers(managers: Sequence[LifecycleManager]) -> int:
+    return sum(len(manager.answers) for manager in managers)
+
+
+def down_and_up(nodes: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    down = [(node, transition) for transition in DOWN for node in reversed(nodes)]
+    up = [(node, transition) for transition in UP for node in nodes]
+    return itertools.cycle([*down, *up])
 
 
 @contextmanager
@@ -95,13 +103,15 @@ def test_no_external_transition_is_undone(peer: Peer, managed: list[tuple[str, .
     with RunningSystem(SYSTEM) as system, busy_processors(2):
         system.wait_for("3 of 3 nodes active")
         each = TRANSITIONS // len(managed)
-        managers = [LifecycleManager(peer, nodes, each) for nodes in managed]
+        managers = [
+            LifecycleManager(peer, nodes, itertools.islice(down_and_up(nodes), each))
+            for nodes in managed
+        ]
         started = len(system.lines)
         for manager in managers:
             manager.send()
-        while any(manager.done < each for manager in managers):
-            done = sum(manager.done for manager in managers)
-            wait_until(partial(has_progress, managers, done), "a response")
+        while (seen := count_answers(managers)) < each * len(managers):
+            wait_until(lambda seen=seen: count_answers(managers) > seen, "a response")
         assert system.stop()[0] == 0
     failed = [text for manager in managers for text in manager.failed]
     lines = system.lines[started:]
