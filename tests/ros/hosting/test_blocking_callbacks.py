@@ -17,17 +17,15 @@ from tests.ros.support.in_process import Peer, end_limit_s, finished, running, w
 CLASSES = "tests.ros.support.callback_classes"
 
 
-@pytest.mark.parametrize("executor", [None, "multi_threaded"])
+@pytest.mark.parametrize("executor", ["kind: events", "kind: multi_threaded, threads: 4"])
 def test_callbacks_sleep_at_a_rate_and_wait_for_their_own_subscription(
-    tmp_path: Path, peer: Peer, executor: str | None, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, peer: Peer, executor: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(health_monitor, "BLOCKS_AFTER_S", 0.1)
-    kind = "" if executor is None else f"executors: {{own: {{kind: {executor}, threads: 4}}}}"
-    chosen = "" if executor is None else ", executor: own"
     text = f"""
     system: sleeping
-    {kind}
-    nodes: {{sleeper: {{class: "{CLASSES}:Sleeper"{chosen}}}}}
+    executors: {{default: {{{executor}}}}}
+    nodes: {{sleeper: {{class: "{CLASSES}:Sleeper"}}}}
     """
     with running(text, tmp_path) as system:
         sleeper = system.node("sleeper").instance

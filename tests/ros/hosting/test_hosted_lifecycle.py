@@ -195,55 +195,38 @@ def test_a_thread_that_outlives_its_instance_is_an_error(tmp_path: Path) -> None
         node_classes.Stubborn.release.set()
 
 
-def test_nodes_change_their_states_at_the_same_time(tmp_path: Path) -> None:
+def test_nodes_change_their_states_at_the_same_time_and_leave_nothing_behind(
+    tmp_path: Path,
+) -> None:
     kinds = ("Talker", "Listener", "Counter", "Navigator", "Sender", "Spinner", "Matcher", "Poller")
+    counted = (node_classes.Talker, node_classes.Listener, node_classes.Counter)
     entries = "".join(
-        f"\n      n{index}: {{class: '{CLASSES}:{kind}', namespace: g{index}}}"
+        f"  n{index}: {{class: '{CLASSES}:{kind}', namespace: g{index}}}\n"
         for index, kind in enumerate(kinds)
     )
-    with running(
-        f"""
-    system: crowd
-    nodes:{entries}
-    """,
-        tmp_path,
-    ) as system:
+
+    def counts() -> tuple[int, int]:
+        gc.collect()
+        instances = sum(isinstance(item, counted) for item in gc.get_objects())
+        return instances, len(list(Path("/proc/self/fd").iterdir()))
+
+    with running(f"system: crowd\nnodes:\n{entries}", tmp_path) as system:
         nodes = [system.node(f"n{index}") for index in range(len(kinds))]
-        for _ in range(5):
+
+        def live() -> None:
             for transition in ("deactivate", "cleanup", "configure", "activate"):
                 done = [node.loop.run_task(node.lifecycle.change(transition)) for node in nodes]
                 wait_until(lambda done=done: all(future.done() for future in done), transition)
                 assert all(future.result().success for future in done)
+
+        live()
+        wait_until(lambda: counts()[0] == len(counted), "the end of the first instances")
+        before = counts()
+        for _ in range(6):
+            live()
+        wait_until(lambda: counts() == before, f"{counts()} instead of {before}")
         assert not any(node.statistics.errors for node in nodes)
         assert "Error" not in system.log_text()
-
-
-def test_many_lives_leave_nothing_behind(tmp_path: Path) -> None:
-    text = f"""
-    system: lives
-    nodes:
-      talker: {{class: "{CLASSES}:Talker"}}
-      listener: {{class: "{CLASSES}:Listener"}}
-      counter: {{class: "{CLASSES}:Counter"}}
-    """
-    kinds = (node_classes.Talker, node_classes.Listener, node_classes.Counter)
-
-    def live(system: object) -> None:
-        for name in ("talker", "listener", "counter"):
-            system.change(name, "deactivate", "cleanup", "configure", "activate")  # type: ignore[attr-defined]
-
-    def counts() -> tuple[int, int]:
-        gc.collect()
-        instances = sum(isinstance(item, kinds) for item in gc.get_objects())
-        return instances, len(list(Path("/proc/self/fd").iterdir()))
-
-    with running(text, tmp_path) as system:
-        live(system)
-        wait_until(lambda: counts()[0] == len(kinds), "the end of the first instances")
-        before = counts()
-        for _ in range(15):
-            live(system)
-        wait_until(lambda: counts() == before, f"{counts()} instead of {before}")
 
 
 LIBRARY = """
