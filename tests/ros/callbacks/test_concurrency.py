@@ -93,13 +93,11 @@ def test_messages_that_arrive_while_a_node_is_inactive_do_not_wait_for_it(
       source:
         executor: chosen
         behavior: resting:Source
-        publishers:
-          output: {{type: std_msgs/msg/Int64, topic: /numbers}}
+        publishers: {{output: {{type: std_msgs/msg/Int64, topic: /numbers}}}}
       sink:
         executor: chosen
         behavior: resting:Sink
-        subscriptions:
-          input: {{type: std_msgs/msg/Int64, topic: /numbers}}
+        subscriptions: {{input: {{type: std_msgs/msg/Int64, topic: /numbers}}}}
     """
     module = """
     from composer.behavior import Behavior

@@ -132,13 +132,9 @@ system: changing
 nodes:
   source:
     behavior: changing:Source
-    publishers:
-      numbers: {type: std_msgs/msg/Int64}
-      texts: {type: std_msgs/msg/String}
+    publishers: {numbers: {type: std_msgs/msg/Int64}, texts: {type: std_msgs/msg/String}}
     timers: {tick: {period_ms: 20}, tock: {period_ms: 20}}
-  forger:
-    behavior: changing:Forger
-    subscriptions: {numbers: {type: std_msgs/msg/Int64}}
+  forger: {behavior: changing:Forger, subscriptions: {numbers: {type: std_msgs/msg/Int64}}}
   reader:
     behavior: changing:Reader
     subscriptions: {numbers: {type: std_msgs/msg/Int64}, texts: {type: std_msgs/msg/String}}
@@ -214,8 +210,7 @@ nodes:
     services:
       ask: {type: std_srvs/srv/Trigger, external: true}
       ask_later: {type: std_srvs/srv/Trigger, external: true}
-    action_servers:
-      drive: {type: composer_interfaces/action/Navigate, external: true}
+    action_servers: {drive: {type: composer_interfaces/action/Navigate, external: true}}
     timers: {tick: {period_ms: 2}, later: {period_ms: 2}}
 """
 HOSTILE_MODULE = """

@@ -206,9 +206,7 @@ def test_data_is_followed_from_the_first_publisher_to_the_last(more: str, tmp_pa
 SYSTEM = """
 system: timed
 nodes:
-  worker:
-    behavior: timed:Worker
-    timers: {work: {period_ms: 100, budget_ms: 20}}
+  worker: {behavior: timed:Worker, timers: {work: {period_ms: 100, budget_ms: 20}}}
   victim: {timers: {tick: {period_ms: 10, set: {}}}}
   source:
     behavior: timed:Source

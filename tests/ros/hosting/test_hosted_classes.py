@@ -241,9 +241,7 @@ def test_log_levels_are_set_per_node(tmp_path: Path) -> None:
     nodes:
       loud: {{class: "{CALLBACK_CLASSES}:Throttled", log_level: debug}}
       quiet: {{class: "{CALLBACK_CLASSES}:Throttled", log_level: error}}
-      own:
-        log_level: warn
-        timers: {{tick: {{period_ms: 10, log: ticking}}}}
+      own: {{log_level: warn, timers: {{tick: {{period_ms: 10, log: ticking}}}}}}
     """
     with running(text, tmp_path) as system:
         system.wait_for_log("tick 3")

@@ -36,10 +36,7 @@ system: robot
 namespace: lab
 processes: {other: {nodes: [camera]}}
 nodes:
-  camera:
-    behavior: busy:Busy
-    parameters: {folder: ""}
-    timers: {tick: {period_ms: 20}}
+  camera: {behavior: busy:Busy, parameters: {folder: ""}, timers: {tick: {period_ms: 20}}}
 """
 #: Nothing of Python runs in a process while C holds the interpreter's lock; DDS does.
 BUSY = """

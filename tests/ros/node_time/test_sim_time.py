@@ -211,9 +211,7 @@ def test_a_sleeping_coroutine_follows_a_switch_of_time(tmp_path: Path, peer: Pee
 MANY = """
 system: many
 nodes:
-  for_${number}:
-    for_each: {number: 4}
-    parameters: {use_sim_time: true}
+  for_${number}: {for_each: {number: 4}, parameters: {use_sim_time: true}}
   real: {}
 """
 
@@ -246,8 +244,7 @@ nodes:
     publishers: {output: {type: std_msgs/msg/Header, external: true}}
     timers: {beat: {period_ms: 100, log: "beat", publish: {output: {stamp: "{now}"}}}}
     introspection: {rosout: true}
-  wall:
-    parameters: {use_sim_time: false}
+  wall: {parameters: {use_sim_time: false}}
 """
 
 

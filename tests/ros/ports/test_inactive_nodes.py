@@ -203,9 +203,7 @@ nodes:
     clients: {wait: {type: std_srvs/srv/Trigger, timeout_ms: 60000}}
     action_servers: {drive: {type: composer_interfaces/action/Navigate, external: true}}
     timers: {beat: {period_ms: 10, publish: {beat: {data: "{count}"}}}}
-  other:
-    behavior: subject:Other
-    services: {wait: {type: std_srvs/srv/Trigger}}
+  other: {behavior: subject:Other, services: {wait: {type: std_srvs/srv/Trigger}}}
 """
 GATED_MODULE = """
 from composer.behavior import Behavior, CallCancelled, TransitionFailed

@@ -215,11 +215,8 @@ nodes:
   caller:
     executor: shared
     behavior: caller:Caller
-    clients:
-      trigger: {type: std_srvs/srv/Trigger, external: true, timeout_ms: 30000}
-    timers:
-      ask: {period_ms: 10}
-      rest: {period_ms: 10}
+    clients: {trigger: {type: std_srvs/srv/Trigger, external: true, timeout_ms: 30000}}
+    timers: {ask: {period_ms: 10}, rest: {period_ms: 10}}
 """
 CALLER_MODULE = """
 from composer.behavior import Behavior, CallCancelled, ServerUnavailable

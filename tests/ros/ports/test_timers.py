@@ -17,8 +17,7 @@ nodes:
   timed:
     parameters:
       rate_hz: {type: double, default: 0.02, unit: Hz, description: Calls a second.}
-    publishers:
-      output: {type: std_msgs/msg/Int64, external: true, qos: {depth: 1000}}
+    publishers: {output: {type: std_msgs/msg/Int64, external: true, qos: {depth: 1000}}}
     timers:
       tick: {rate_hz: "{parameters.rate_hz}", publish: {output: {data: "{count}"}}}
 """

@@ -20,8 +20,7 @@ nodes:
         external: true
         log: "got {message.data}, the {count}th"
         publish: {output: {data: "{message.data + 1}"}}
-    publishers:
-      output: {type: std_msgs/msg/Int64, external: true}
+    publishers: {output: {type: std_msgs/msg/Int64, external: true}}
   listener:
     lifecycle: {autostart: inactive}
     subscriptions:
@@ -55,8 +54,7 @@ system: talkative
 nodes:
   talkative:
     behavior: talkative:Talkative
-    publishers:
-      output: {type: std_msgs/msg/String, external: true}
+    publishers: {output: {type: std_msgs/msg/String, external: true}}
   talker:
     behavior: talkative:Talker
     publishers:

@@ -184,8 +184,7 @@ nodes:
     lifecycle: {autostart: inactive}
     subscriptions:
       odometry: {type: nav_msgs/msg/Odometry, qos: command, external: true, log: got}
-    transforms:
-      dynamic: {base_link: {parent: odom, from: odometry}}
+    transforms: {dynamic: {base_link: {parent: odom, from: odometry}}}
 """
 
 
