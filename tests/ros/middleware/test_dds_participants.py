@@ -23,7 +23,7 @@ from composer.runtime.middleware.local_resources import (
     ended_participants,
 )
 from composer.runtime.ros.graph import UNKNOWN_NODE, RosGraph, participant
-from tests.ros.support.commands import PYTHON, compose, hand_written, running
+from tests.ros.support.commands import compose, hand_written, running
 from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.in_process import Peer, wait_until
 from tests.ros.support.raw_rmw import NodeNames, own_prefix
@@ -79,6 +79,17 @@ def shared_memory() -> set[str]:
     return set(re.findall("/dev/shm/fast.*", Path("/proc/self/maps").read_text(encoding="utf-8")))
 
 
+def output_of(folder: Path, code: str, *arguments: str) -> str:
+    """Run a program with the environment of a command; return the last line that it prints."""
+    program = folder / "program.py"
+    program.write_text(code, encoding="utf-8")
+    process = ForkedProgram(program, *arguments, chooses_profile=True)
+    printed, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0, printed
+    assert "XML" not in printed  # printed if the profile is invalid
+    return printed.splitlines()[-1]
+
+
 def test_nodes_of_tests_do_not_use_shared_memory(request: pytest.FixtureRequest) -> None:
     """Next to a killed process, they would occasionally crash or hang when destroyed."""
     before = shared_memory()  # of tests that take part in a discovery of this computer
@@ -88,16 +99,15 @@ def test_nodes_of_tests_do_not_use_shared_memory(request: pytest.FixtureRequest)
 
 
 @pytest.mark.timeout(200)
-def test_a_new_process_discovers_others_with_all_topics_at_once(peer: Peer) -> None:
+def test_a_new_process_discovers_others_with_all_topics_at_once(
+    tmp_path: Path, peer: Peer, capfd: pytest.CaptureFixture[str]
+) -> None:
     for topic in TOPICS:
         peer.node.create_publisher(Empty, topic, 1)
     attempts = []
     for _ in range(ATTEMPTS):
-        done = subprocess.run(
-            [*PYTHON, "-c", JOIN], check=True, capture_output=True, text=True, timeout=50.0
-        )
-        assert "XML" not in done.stderr + done.stdout  # printed if the profile is invalid
-        took_s, missing = json.loads(done.stdout.splitlines()[-1])
+        took_s, missing = json.loads(output_of(tmp_path, JOIN))
+        assert "XML" not in capfd.readouterr().err
         if sum(join_s < AT_ONCE_S for join_s in took_s) >= ENOUGH <= missing.count(0):
             return
         attempts.append((took_s, missing))
@@ -192,11 +202,8 @@ def test_a_command_discovers_others_without_shared_memory_and_is_forgotten_soon(
 
     before = participants()
     multicast = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
-    program = tmp_path / "print_transports.py"
-    program.write_text(PRINT_TRANSPORTS, encoding="utf-8")
     for _ in range(3):  # most of their goodbye messages are lost
-        printed, _ = ForkedProgram(program, chooses_profile=True).communicate(timeout=50.0)
-        others, ports, shared = json.loads(printed.splitlines()[-1])
+        others, ports, shared = json.loads(output_of(tmp_path, PRINT_TRANSPORTS))
         assert [peer.node.get_name(), peer.node.get_namespace()] in others
         assert shared == []
         assert ports
@@ -241,19 +248,14 @@ os._exit(0)
 """
 
 
-def test_no_thread_wakes_after_each_message(peer: Peer) -> None:
+def test_no_thread_wakes_after_each_message(
+    tmp_path: Path, peer: Peer, capfd: pytest.CaptureFixture[str]
+) -> None:
     received: list[String] = []
     peer.node.create_subscription(String, "/texts", received.append, 10)
-    done = subprocess.run(
-        [*PYTHON, "-c", PUBLISH, "/texts"],
-        check=True,
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-    )
+    slept, took_s = json.loads(output_of(tmp_path, PUBLISH, "/texts"))
     assert received
-    assert "XML" not in done.stderr + done.stdout  # printed if the profile is invalid
-    slept, took_s = json.loads(done.stdout.splitlines()[-1])
+    assert "XML" not in capfd.readouterr().err
     # A few times in 4 ms; by default twice for each of the 5000 messages in a second.
     assert 0 < slept < 2000.0 * took_s
 
