@@ -155,7 +155,7 @@ class ForkedCommand(ForkedProcess):
         env: Mapping[str, str] | None = None,
         chooses_profile: bool = True,
     ) -> None:
-        environment = _environment(chooses_profile) | dict(env or {})
+        environment = _environment(env or {}, chooses_profile=chooses_profile)
         super().__init__(
             _run_command,
             ("compose", *arguments),
@@ -182,16 +182,18 @@ class ForkedProgram(ForkedProcess):
             super().__init__(
                 _run_program,
                 (str(program), *arguments),
-                _environment(chooses_profile),
+                _environment({}, chooses_profile=chooses_profile),
                 stderr=stderr,
                 reads=True,
             )
 
 
-def _environment(chooses_profile: bool) -> dict[str, str]:
+def _environment(variables: Mapping[str, str], *, chooses_profile: bool) -> dict[str, str]:
     if not chooses_profile:
-        return dict(os.environ)
-    return {name: value for name, value in os.environ.items() if name != _PROFILE} | _DISCOVERY
+        return {**os.environ, **variables}
+    environment = {**os.environ, **_DISCOVERY, **variables}
+    environment.pop(_PROFILE, None)
+    return environment
 
 
 def _pipe() -> tuple[TextIO, Connection]:
