@@ -236,7 +236,7 @@ class Interfaces:
                 if nested is not None:
                     return nested
                 continue
-            written = re.search(rf"(?m)^.*\s{re.escape(field.name)}\b", definition.text)
+            written = re.search(rf"(?m)^[^#\n]*\s{re.escape(field.name)}\b", definition.text)
             line = definition.text.count("\n", 0, written.start()) + 1 if written else 1
             return InvalidDefinition(
                 interface.name, definition.path, line, message, definition.text, hint

@@ -43,7 +43,7 @@ from composer.runtime.hosting.user_code import ThreadedCall, end_callbacks
 from composer.runtime.node.behavior_loader import BehaviorLoadError, behavior_class, plain_name
 from composer.runtime.node.local_node import LocalNode
 from composer.runtime.node.managed_node import TransitionOutcome
-from composer.runtime.node.node import WrongReturn
+from composer.runtime.node.node import Failed, WrongReturn
 from composer.runtime.node.options import NodeOptions, make_ros_node
 from composer.runtime.node.parameters import declare, ros_parameters
 from composer.runtime.ports import PortSet
@@ -138,6 +138,8 @@ class HostedNode(LocalNode):
         answer = instance.instrumented(name, getattr(instance.node, name))(state)
         if answer == TransitionCallbackReturn.FAILURE:
             raise TransitionFailed(f"{name} returned FAILURE")
+        if answer == TransitionCallbackReturn.ERROR:
+            raise Failed(f"{name} returned ERROR")
         if answer != TransitionCallbackReturn.SUCCESS:
             raise WrongReturn(f"{name} returned {answer!r}, not a TransitionCallbackReturn")
 

@@ -168,7 +168,7 @@ def test_behaviors_and_classes_can_fail_their_nodes(tmp_path: Path) -> None:
         "/in_configure": "configure failed: Failed: lost the device",
         "/in_activate": "activate failed: Failed: lost the device",
         "/in_tick": "lost the device",
-        "/of_class": "activate failed: ",
+        "/of_class": "activate failed: Failed: on_activate returned ERROR",
     }
     with running(FAILING, tmp_path, driver=FAILING_DRIVER) as system:
         wait_until(lambda: len(system.reported(Restarted)) == len(reasons), "the restarts")

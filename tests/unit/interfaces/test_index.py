@@ -170,7 +170,7 @@ UNKNOWN = "field '{}' has the unknown type"
 @pytest.mark.parametrize(
     ("text", "message", "line", "hint"),
     [
-        ("# b\nbool on\nOthr a\n", UNKNOWN.format("a"), 3, "did you mean 'demo_msgs/Other'?"),
+        ("# an a\nbool on\nOthr a\n", UNKNOWN.format("a"), 3, "did you mean 'demo_msgs/Other'?"),
         ("std_msgs/Heder a\n", UNKNOWN.format("a"), 1, "did you mean 'std_msgs/Header'?"),
         ("std_msg/Header a\n", UNKNOWN.format("a"), 1, "did you mean 'std_msgs/Header'?"),
         ("Header a\n", UNKNOWN.format("a"), 1, "did you mean 'std_msgs/Header'?"),
