@@ -20,6 +20,7 @@ from composer.base.diagnostics import (
     Severity,
     Subject,
     error,
+    shown,
     suggestion,
 )
 from composer.base.fast_dataclass import dataclass
@@ -179,8 +180,9 @@ def missing(source: BehaviorSource, not_installed: Rule) -> Iterator[Diagnostic]
     elif not source.module_found:
         nearby = nearby_modules(module, (reference.folder, *reference.node_folders))
         message = f"no Python module named '{module}'"
+        path = shown(module.replace(".", "/"))
         hint = nearby.hint or (
-            f"expected {module.replace('.', '/')}.py next to the YAML file, among the node types,"
+            f"expected {path}.py next to the YAML file, among the node types,"
             " or on Python's module search path"
         )
         if nearby.package:

@@ -106,10 +106,19 @@ def test_definitions_without_a_package_xml(tmp_path: Path, monkeypatch: pytest.M
     assert hints == ["'interfaces/x_msgs' has no package.xml: add one that names 'x_msgs'"]
 
 
-@pytest.mark.parametrize("package", ["y" * 3000, "y/" * 1500, "Y" * 150])
-def test_the_hint_about_an_unknown_type_is_short(tmp_path: Path, package: str) -> None:
-    port = f"{{type: {package}/msg/State, qos: state, external: true}}"
-    text = f"system: x\nnodes: {{n: {{publishers: {{out: {port}}}}}}}\n"
+@pytest.mark.parametrize(
+    "node",
+    [
+        *(
+            f"publishers: {{out: {{type: {package}/msg/State, qos: state, external: true}}}}"
+            for package in ("y" * 3000, "y/" * 1500, "Y" * 150)
+        ),
+        f"behavior: '{'9' * 3000}:Driver'",
+    ],
+    ids=["package", "parts", "capitals", "module"],
+)
+def test_hints_about_long_names_are_short(tmp_path: Path, node: str) -> None:
+    text = f"system: x\nnodes: {{n: {{{node}}}}}\n"
     errors = [item for item in diagnostics_in(text, tmp_path) if item.severity is Severity.ERROR]
     assert 0 < max(len(str(item.hint)) for item in errors) < 400
 
