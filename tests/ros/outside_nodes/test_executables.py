@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -22,7 +23,6 @@ from composer.runtime.supervision.events import (
     StateChanged,
 )
 from tests.ros.members.split_robot import alive, pid_of
-from tests.ros.support.forked import ForkedProgram
 from tests.ros.support.in_process import Peer, running, wait_until
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
@@ -62,10 +62,19 @@ connections:
 
 
 def printed_by(*words: str) -> str:
-    """Return what the driver prints about itself, started with ``words`` as ``ros2 run`` would."""
-    process = ForkedProgram(PROGRAMS / "driver.py", *words)
+    """Return what the driver prints about itself, started with ``words`` as ``ros2 run`` would.
+
+    Not forked: it leaves the ROS graph at its end, which the tests look at.
+    """
+    process = subprocess.Popen(
+        [sys.executable, PROGRAMS / "driver.py", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
     try:
-        return next(line.strip() for line in process.stdout if line.startswith("I am "))
+        assert process.stdout is not None
+        return process.stdout.readline().strip()
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60)
