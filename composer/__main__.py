@@ -5,12 +5,13 @@ It begins without an import from a file: until Ctrl-C has its default action, it
 
 # The part of signal that is built in.
 import _signal as signal  # type: ignore[import-not-found]
-import gc
-import sys
 
 _IS_INTERRUPTIBLE = signal.getsignal(signal.SIGINT) is signal.default_int_handler
 if _IS_INTERRUPTIBLE:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+import gc  # noqa: E402 - after the above
+import sys  # noqa: E402
 
 if __name__ == "__main__" and not sys.flags.safe_path:
     # Python puts the current folder first, where a signal.py would replace the library's.
