@@ -309,13 +309,20 @@ def kill_descendants(folder: Path) -> None:
 
 
 def _kill_if_marked(entry: Path, mark: bytes) -> bool:
-    """Kill the process of an entry of /proc with ``mark`` in its environment; say if it had it."""
+    """Kill the process of an entry of /proc with ``mark`` in its environment.
+
+    Return whether it had it, or may have it: while a program starts, its environment is empty.
+    """
     try:
         process = os.pidfd_open(int(entry.name))  # its number may be reused once it has ended
     except OSError:
         return False
     try:
-        if mark not in (entry / "environ").read_bytes().split(b"\0"):
+        environment = (entry / "environ").read_bytes()
+        if not environment:
+            (entry / "exe").readlink()  # threads of the kernel have no program
+            return True
+        if mark not in environment.split(b"\0"):
             return False
         signal.pidfd_send_signal(process, signal.SIGKILL)
     except OSError:  # it has ended, or belongs to another user

@@ -17,7 +17,13 @@ from pathlib import Path
 import pytest
 
 from composer.runtime.children import launcher
-from composer.runtime.children.child_processes import Child, ChildProcesses, Command, StartFailed
+from composer.runtime.children.child_processes import (
+    Child,
+    ChildProcesses,
+    Command,
+    StartFailed,
+    kill_descendants,
+)
 from composer.runtime.executors.tracebacks import format_stack, stacks_of
 from tests.unit.support.waiting import PATIENCE_S, is_alive, status_of, wait_until
 
@@ -185,6 +191,20 @@ def test_nothing_survives_the_launcher(children: ChildProcesses) -> None:
     again = start(children, "exit 0", [])  # by a new launcher
     wait_until(again.ended.done, "the end")
     assert again.ended.result() == 0
+
+
+def test_what_starts_another_program_at_the_moment_is_killed_as_well(tmp_path: Path) -> None:
+    """Its environment is empty then."""
+    program = tmp_path / "again"
+    program.write_text('#!/bin/sh\nexec "$0"\n', encoding="utf-8")
+    program.chmod(0o755)
+    for _ in range(60):  # one of eleven was missed
+        with subprocess.Popen([program], env={launcher.MARK: str(tmp_path)}) as process:
+            try:
+                kill_descendants(tmp_path)
+                assert process.wait(10.0) == -signal.SIGKILL
+            finally:
+                process.kill()
 
 
 def test_a_launcher_that_was_killed_is_closed_without_an_error(children: ChildProcesses) -> None:
