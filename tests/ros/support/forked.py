@@ -230,7 +230,8 @@ def _run(
     if source is not None:
         sys.stdin = open(0, encoding="utf-8")  # noqa: SIM115
     is_unbuffered = bool(environment.get("PYTHONUNBUFFERED"))
-    sys.stdout = open(1, "w", encoding="utf-8", buffering=1 if is_unbuffered else -1)  # noqa: SIM115
+    out_text = open(1, "w", encoding="utf-8", buffering=1 if is_unbuffered else -1)  # noqa: SIM115
+    sys.stdout = sys.__stdout__ = out_text  # what Fast DDS prints there is not data of commands
     sys.stderr = open(2, "w", encoding="utf-8", buffering=1, errors="backslashreplace")  # noqa: SIM115
     sys.argv = arguments
     call(arguments)
