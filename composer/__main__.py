@@ -11,7 +11,7 @@ if _IS_INTERRUPTIBLE:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 import gc  # noqa: E402 - after the above
-import sys  # noqa: E402
+import sys  # noqa: E402 - after the above
 
 if __name__ == "__main__" and not sys.flags.safe_path:
     # Python puts the current folder first, where a signal.py would replace the library's.

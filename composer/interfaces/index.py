@@ -175,7 +175,7 @@ class Interfaces:
     def names(self, *folders: str) -> tuple[str, ...]:
         """Return the names of all interfaces in folders (msg, srv, action; default: all), sorted.
 
-        Those of a folder come before those of the next one.
+        The names of a folder come before the names of the next one.
         """
         for folder in folders or FOLDERS:
             if folder not in self._names:

@@ -315,6 +315,29 @@ def test_large_scenarios(tmp_path: Path, section: str, part: str) -> None:
     assert_linear(validate, 8_000, 80_000)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("declaring", "system"),
+    [
+        ("node: part\nvariables:\n", "nodes: {n: {type: part}}\n"),
+        ("system: part\nnodes: {n: {}}\narguments:\n", "include: [nodes/part.yaml]\n"),
+    ],
+    ids=["variables", "arguments"],
+)
+def test_many_missing_values(tmp_path: Path, declaring: str, system: str) -> None:
+    def validate(count: int) -> None:
+        folder = tmp_path / str(count)
+        (folder / "nodes").mkdir(parents=True, exist_ok=True)
+        (folder / "composer.yaml").touch()
+        names = "".join(f"  v{number}: {{description: speed}}\n" for number in range(count))
+        (folder / "nodes" / "part.yaml").write_text(f"{declaring}{names}")
+        loading = load_bytes(f"system: large\n{system}".encode(), folder, shown="large.yaml")
+        rules = [diagnostic.rule.name for diagnostic in loading.diagnostics]
+        assert rules.count("missing-variable") >= min(count, 400)
+
+    assert_linear(validate, 60, 480)
+
+
 NODE_TYPE = "node: big\npublishers:\n" + "".join(f"  p{n}: {{{STRING}}}\n" for n in range(400))
 PARAMETERS = ", ".join(f"a{number}: 1" for number in range(5_001))
 FRAMES = ", ".join(f"f{number}: {{parent: map}}" for number in range(5_001))

@@ -81,12 +81,7 @@ def missing_names(tree: Mapping, given: Collection[str]) -> tuple[str, ...]:
 
     A variable that was given under another name is left out: ``expand`` reports it.
     """
-    scope = read_scope(tree)
-    unknown = [name for name in given if name not in scope.declared]
-    for name in unknown:
-        scope.hint(name)
-    missing = _without_value(scope, given)
-    return () if len(unknown) == len(missing) == 1 else missing
+    return _missing_names(read_scope(tree), given)
 
 
 def missing_values(
@@ -96,12 +91,20 @@ def missing_values(
 
     ``owner`` is what the file declares, ``user`` what gives the values.
     """
-    for name in missing_names(tree, given):
-        scope = read_scope(tree)
+    scope = read_scope(tree)
+    for name in _missing_names(scope, given):
         message = f"{owner} needs a value for its {scope.word} '{shown(name)}'"
         label = Label(scope.declared[name].key.span, "declared without default")
         hint = f"add '{scope.section}: {{{shown(name)}: ...}}' to the {user}"
         yield Diagnostic(rules.MISSING_VARIABLE, message, span, (label,), hint)
+
+
+def _missing_names(scope: Scope, given: Collection[str]) -> tuple[str, ...]:
+    unknown = [name for name in given if name not in scope.declared]
+    for name in unknown:
+        scope.hint(name)
+    missing = _without_value(scope, given)
+    return () if len(unknown) == len(missing) == 1 else missing
 
 
 def _typed(scope: Scope, given: Map[str, Entry]) -> tuple[dict[str, Entry], list[Diagnostic]]:

@@ -22,7 +22,7 @@ class DeclaredNode:
     """What an inline node declares, or a node type with the variables of a node.
 
     ``complete`` is false if the file of the type has errors, so that declarations may be missing.
-    ``files`` are its own file and those of the types that it extends.
+    ``files`` are its own file and the files of the types that it extends.
     """
 
     tree: Mapping
@@ -52,7 +52,7 @@ class NodeTypeLoader:
         return self._found[known]
 
     def declare(self, tree: Mapping, folders: SourceFolders | None = None) -> Declaration:
-        """Read the declaration of a node; ``folders`` are those of its type, if it has one."""
+        """Read the declaration of a node; ``folders`` belong to its type, if it has one."""
         return declare(tree, folders or self.folders, self.qos, self.diagnostics)
 
     def instantiate(self, path: Path, variables: Tree | None, span: Span) -> DeclaredNode | None:

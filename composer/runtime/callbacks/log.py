@@ -143,7 +143,7 @@ class ErrorLimit:
         max_errors: int,
         window_s: float,
         report: Callable[[str], None],
-        counts: Callable[[], bool] = lambda: True,
+        counts: Callable[[], bool],
     ) -> None:
         """Count errors only while ``counts()``."""
         self._max_errors = max_errors

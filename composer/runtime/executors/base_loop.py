@@ -214,7 +214,7 @@ class BaseLoop(ABC):
     def is_current(self) -> bool:
         """Return whether the calling thread belongs to the loop."""
 
-    def overlap(self) -> None:  # noqa: B027  most loops are not
+    def overlap(self) -> None:  # noqa: B027 - most loops do not
         """Let other threads serve the loop while a callback runs, if it is parallel."""
 
     @abstractmethod

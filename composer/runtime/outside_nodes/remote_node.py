@@ -45,8 +45,8 @@ class NodePresence:
     """The endpoints of one node, as the manager node has discovered them.
 
     DDS shows a killed process for 20 s more. An endpoint has the prefix of its participant, so the
-    endpoints of an earlier process can be ignored: those of :meth:`participants` at its start are
-    ``earlier``.
+    endpoints of an earlier process can be ignored: ``earlier`` are the :meth:`participants` at the
+    start of this one.
     """
 
     def __init__(self, manager: RosNode, model: Node) -> None:

@@ -99,7 +99,7 @@ def test_messages_below_the_level_are_not_logged(tmp_path: Path) -> None:
 )
 def test_an_error_limit_is_reported_once(times_s: tuple[float, ...], reports: int) -> None:
     texts: list[str] = []
-    limit = ErrorLimit(2, 10.0, texts.append)
+    limit = ErrorLimit(2, 10.0, texts.append, lambda: True)
     limit.start()
     for at_s in times_s:
         limit.count(at_s)
@@ -108,7 +108,7 @@ def test_an_error_limit_is_reported_once(times_s: tuple[float, ...], reports: in
 
 def test_an_error_limit_counts_from_each_start_except_while_it_is_paused() -> None:
     texts: list[str] = []
-    limit = ErrorLimit(2, 10.0, texts.append)
+    limit = ErrorLimit(2, 10.0, texts.append, lambda: True)
     for at_s in (1.0, 1.1, 1.2):
         limit.count(at_s)
     assert texts == [], "not started"

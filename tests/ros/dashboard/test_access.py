@@ -124,7 +124,7 @@ def test_only_files_of_the_page_are_served(server: Dashboard) -> None:
     for path in NO_FILES_OF_THE_PAGE:
         response = get(server.address, path)
         assert response.status == 404, path
-        assert b"import" not in response.body, path  # type: ignore[attr-defined]
+        assert b"import" not in response.body, path
 
 
 def test_websockets_of_others_are_refused(server: Dashboard) -> None:

@@ -181,7 +181,7 @@ def test_the_usage_of_a_system_is_that_of_its_processes() -> None:
 
 
 def report(name: str, **nodes: dict[str, str]) -> SystemReport:
-    reported = tuple(NodeReport(f"/{node}", "active", **nodes[node]) for node in nodes)  # type: ignore[arg-type]
+    reported = tuple(NodeReport(f"/{node}", "active", **nodes[node]) for node in nodes)
     return of_system(name, SystemReport(name, "running", reported, "robot", "1"))
 
 

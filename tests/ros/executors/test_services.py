@@ -227,7 +227,7 @@ def test_a_wrapped_future_has_the_outcome_of_the_rclpy_future_and_cancels_both_w
     assert future.cancelled()
 
 
-class serving:  # noqa: N801
+class serving:  # noqa: N801 - used like a function
     """An action server that takes three steps, or continues forever if it is slow."""
 
     def __init__(self, on: Bench, **options: Any) -> None:
@@ -321,7 +321,7 @@ def answers(asking: Any) -> bool:
     future = asking.call_async(ListParameters.Request())
     until = time.monotonic() + 1.0
     while not future.done() and time.monotonic() < until:
-        time.sleep(0.002)
+        time.sleep(0.002)  # poll: rclpy's futures have no wait
     return bool(future.done())
 
 

@@ -48,7 +48,7 @@ def test_all_nodes_are_listed_with_their_states(client: LifecycleClient) -> None
     assert client.states(NODES) == dict.fromkeys(NODES, "unconfigured")
 
 
-#: Names that are not those of one node, and the hints.
+#: Names that no single node has, and the hints.
 WRONG_NAMES = {
     "planner": "use a full name: /other/planner, /planning/planner",  # ambiguous
     "planer": r"did you mean '/(planning|other)/planner'\?",
